@@ -193,7 +193,8 @@ worlds import none.map -o new.yaml
 worlds import none.yaml -o new.yaml
 worlds import nothing.json -o folder
 worlds import nothing.world -o new.yaml
-worlds import w.world -o new.yaml --overhang 1
+worlds import w.world -o new.yaml --band 2,1
+worlds import w.map -o new.yaml --band 0,1
 worlds import w.yaml -o new.yaml
 worlds import w.yaml -o new.yaml --resolution 1
 worlds import w.yaml -o new.yaml --unknown perhaps

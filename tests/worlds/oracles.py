@@ -1,5 +1,6 @@
 """Oracles: slow, simple functions that share no code with the compiled ones; and random worlds to compare them on."""
 
+import math
 from collections import deque
 
 import numpy as np
@@ -96,3 +97,15 @@ def worlds(draw, max_discs=6):
         )
     )
     return World("made up", (-5.0, -4.0, 5.0, 6.0), tuple(discs))
+
+
+def rotation(roll, pitch, yaw):
+    """The rotation matrix of roll, pitch and yaw about fixed axes, as a product of turns about one axis each."""
+    turns = []
+    for axis, angle in enumerate((roll, pitch, yaw)):
+        i, j = [(1, 2), (2, 0), (0, 1)][axis]
+        turn = np.eye(3)
+        turn[i, i] = turn[j, j] = math.cos(angle)
+        turn[j, i], turn[i, j] = math.sin(angle), -math.sin(angle)
+        turns.append(turn)
+    return turns[2] @ turns[1] @ turns[0]

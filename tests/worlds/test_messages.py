@@ -126,8 +126,8 @@ def test_invalid_worlds_are_refused_in_one_line(tmp_path, monkeypatch, data_regr
         return import_movingai_task(tmp_path / "w.map", **options)
 
     octile, sets, models = test_movingai.written, test_dynabarn.written, test_sdf.world
-    cans = [test_sdf.shape("box", name=f"box{i}") for i in range(9)]
-    oval = test_sdf.state("<model name='can'><pose>1 1 0 0 0 0</pose><scale>0.5 0.6 1</scale></model>")
+    cans = [test_sdf.shape("heightmap", name=f"hill{i}") for i in range(9)]
+    scaled = test_sdf.state("<model name='can'><pose>1 1 0 0 0 0</pose><scale>0.5 -1 1</scale></model>")
     problems = [
         "",
         "version 2\n",
@@ -145,7 +145,11 @@ def test_invalid_worlds_are_refused_in_one_line(tmp_path, monkeypatch, data_regr
         "dynabarn": numbered(lambda c=c: import_dynabarn(sets(tmp_path, c)) for c in test_dynabarn.BAD),
         "sdf models": {
             name: lambda c=c: test_sdf.discs(models(tmp_path, c))
-            for name, c in {**test_sdf.UNSUPPORTED, "many": "".join(cans), "oval": test_sdf.cylinder() + oval}.items()
+            for name, c in {
+                **test_sdf.UNSUPPORTED,
+                "many": "".join(cans),
+                "scaled": test_sdf.cylinder() + scaled,
+            }.items()
         },
         "sdf files": {name: lambda c=c: sdf(c) for name, c in test_sdf.BAD_XML.items()},
         "movers": numbered(WRONG),

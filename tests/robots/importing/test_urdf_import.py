@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from antdrive.base import InputError
 from antdrive.robots import Footprint, load_robot
 from antdrive.robots.importing.hull import convex_hull, fewer_corners, footprint_around
-from antdrive.robots.importing.model import checked_mesh
 from antdrive.robots.importing.urdf_import import import_urdf
 from antdrive.robots.robot_file import footprint_to_dict as written
+from antdrive.worlds.formats.meshes import checked_mesh
 from benchmarks.robots import SPECIFICATIONS, values_of
 
 FIXTURES = Path(__file__).parent / "urdf"

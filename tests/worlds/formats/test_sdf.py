@@ -1,10 +1,11 @@
-"""Gazebo worlds: supported models and invalid files."""
+"""Gazebo worlds: cylinders, poses and invalid files."""
 
 import math
 
 import numpy as np
 import pytest
 
+from antdrive.base import InputError
 from antdrive.worlds import Disc, import_sdf, load_task, point_clearance, save_task
 
 GROUND = """
@@ -134,45 +135,61 @@ def test_degrees_are_degrees(tmp_path):
 
 
 UNSUPPORTED = {
-    "box": shape("box", "<size>1 1 1</size>", "crate"), "sphere": shape("sphere", "<radius>1</radius>", "ball"),
-    "mesh": shape("mesh", "<uri>model://x.dae</uri>", "statue"), "tilted": cylinder("pisa", "0 0 0 0.1 0 0"),
-    "lying": cylinder("log", collision="0 0 0 0 1.5708 0"),
-    "standing plane": shape("plane", "<normal>1 0 0</normal>", "wall"), "not static": cylinder("cart", static="0"),
+    "terrain": shape("heightmap", name="hill"), "image": shape("image", name="statue"),
+    "standing plane": shape("plane", "<normal>1 0 0</normal>", "wall"),
     "other frame": cylinder("tied").replace("<pose frame=''>", "<pose relative_to='other'>"),
     "short pose": cylinder("odd", "1 2 3"), "pose of words": cylinder("odd", "a b c d e f"),
     "infinite pose": cylinder("odd", "inf 0 0 0 0 0"), "negative radius": cylinder("odd", radius=-1.0),
-    "included": "<include><uri>model://house</uri></include>", "actor": "<actor name='walker'/>",
+    "flat box": shape("box", "<size>1 0 1</size>"), "no radius": shape("sphere"),
+    "quaternion": cylinder("odd").replace("<pose frame=''>", "<pose rotation_format='quat_xyzw'>"),
+    "part of a mesh": shape("mesh", "<uri>made.world</uri><submesh><name>wheel</name></submesh>"),
+    "two points": shape("polyline", "<point>0 0</point><point>1 0</point><height>1</height>"),
+    "far box": shape("box", "<size>1e6 1e6 9e5</size>").replace("<collision name='c'>", "<collision><pose>9e5 0 0 0 0 0</pose>"),
+    "included": "<include><uri>model://house</uri></include>",
+    "no mesh": shape("mesh"),
+    "mesh": shape("mesh", "<uri>model://x.dae</uri>", "statue"), "population": "<population name='crowd'/>",
+    "fast actor": "<actor name='a'><script><trajectory id='0'><waypoint><time>0</time><pose>0 0 0 0 0 0</pose></waypoint>"
+    "<waypoint><time>1</time><pose>90 0 0 0 0 0</pose></waypoint></trajectory></script></actor>",
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("case", UNSUPPORTED)
-def test_models_that_are_not_upright_cylinders_can_be_skipped(case, tmp_path):
+def test_what_is_unsupported_can_be_skipped(case, tmp_path):
     path = world(tmp_path, cylinder("good", "5 5 0.5 0 0 0"), UNSUPPORTED[case])
+    with pytest.raises(InputError, match="--skip-unsupported"):
+        discs(path)
     assert discs(path, skip_unsupported=True) == (Disc(5.0, 5.0, 0.5),)
 
 
 def test_the_supported_parts_of_a_model_stay_and_each_skipped_part_is_named(tmp_path):
     post = "<cylinder><radius>0.05</radius><length>0.7</length></cylinder>"
     leg = f"<collision name='leg'><pose>0.4 0 0.35 0 0 0</pose><geometry>{post}</geometry></collision>"
-    top = "<collision name='top'><geometry><box><size>1 1 0.04</size></box></geometry></collision>"
-    lamp = f"<model name='lamp'><link name='l'>{top.replace('box', 'sphere')}</link></model>"
+    top = "<collision name='top'><geometry><image><uri>a.png</uri></image></geometry></collision>"
+    lamp = f"<model name='lamp'><link name='l'>{top.replace('image', 'heightmap')}</link></model>"
     table = f"<model name='table'><static>1</static><pose>3 2 0 0 0 0</pose><link name='body'>{top}{leg}</link>{lamp}</model>"
     skipped = []
     task = import_sdf(world(tmp_path, table), skip_unsupported=True, on_skipped=skipped.extend)
     assert task.world.obstacles == (Disc(3.4, 2.0, 0.05, 0.7),)
-    assert skipped == ["table::body::top (box)", "table::lamp::l::top (sphere)"]
+    assert skipped == ["table::body::top (shape image)", "table::lamp::l::top (uneven ground)"]
 
 
 def test_the_usual_includes_are_ignored(tmp_path):
-    includes = [f"<include><uri>model://{name}</uri></include>" for name in ("sun", "ground_plane")]
+    names = (
+        "model://sun",
+        "model://ground_plane",
+        "https://fuel.gazebosim.org/1.0/OpenRobotics/models/Ground Plane/3",
+        "Sun",
+    )
+    includes = [f"<include><uri>{name}</uri></include>" for name in names]
     assert len(discs(world(tmp_path, *includes, cylinder()))) == 1
 
 
 BAD_XML = {
     "no xml": "hello", "empty": "", "cut off": "<sdf>\n<world>\n", "no sdf": "<robot name='r'/>",
-    "no world": "<sdf version='1.6'><model name='m'/></sdf>", "no cylinder": "<sdf><world name='w'/></sdf>",
+    "no world": "<sdf version='1.6'><light name='m'/></sdf>", "no obstacle": "<sdf><world name='w'/></sdf>",
     "entities": "<!DOCTYPE sdf [<!ENTITY a 'b'>]><sdf><world>&a;</world></sdf>",
     "external entity": "<!DOCTYPE s SYSTEM 'file:///etc/passwd'><sdf/>", "deep": "<a>" * 5000 + "</a>" * 5000,
+    "xacro": "<sdf xmlns:xacro='http://ros.org/wiki/xacro'><xacro:arg name='a'/><world name='w'/></sdf>",
     "unknown encoding": "<?xml version='1.0' encoding='x-nothing'?><sdf/>",
 }  # fmt: skip
 

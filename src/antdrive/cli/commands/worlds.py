@@ -218,9 +218,14 @@ def import_world(
     goal: Annotated[str | None, option("X,Y", "Goal [m]; maps contain none.")] = None,
     bounds: Annotated[
         str | None,
-        option("BOUNDS", "SDF: walls at XMIN,YMIN,XMAX,YMAX [m].  [default: 1 m around the cylinders]"),
+        option("BOUNDS", "SDF: walls at XMIN,YMIN,XMAX,YMAX [m].  [default: 1 m around the obstacles]"),
     ] = None,
-    skip_unsupported: Annotated[bool, flag("SDF: skip all but upright cylinders.", "--skip-unsupported")] = False,
+    skip_unsupported: Annotated[
+        bool, flag("SDF: skip missing models and unsupported parts.", "--skip-unsupported")
+    ] = False,
+    band: Annotated[
+        str | None, option("LOW,HIGH", "SDF: heights between which shapes are obstacles [m].  [default: 0.01,2]")
+    ] = None,
     unknown: Annotated[
         str | None,
         option("KIND", "map_server: unknown cells and those of shade 205 are blocked or free.  [default: blocked]"),
@@ -229,13 +234,13 @@ def import_world(
         float | None,
         option(
             "METRES",
-            "Maps: overhang of cylinders beyond blocked cells [m].  [default: 0.207 cells]",
+            "Maps, SDF: overhang of cylinders beyond blocked cells [m].  [default: 0.207 cells; SDF: 1 cell]",
             min=0,
             max=1e6,
         ),
     ] = None,
     resolution: Annotated[
-        float | None, option("METRES", "MovingAI: cell size [m].  [default: 1]", min=1e-6, max=1e6)
+        float | None, option("METRES", "MovingAI, SDF: cell size [m].  [default: 1; SDF: 0.02]", min=1e-6, max=1e6)
     ] = None,
     problem: Annotated[
         int | None,
@@ -249,10 +254,11 @@ def import_world(
 ) -> None:
     """Convert another program's world or map to a world file.
 
-    World files consist of upright cylinders. SDF cylinders are kept as they are. In a map, cylinders cover every blocked
-    cell next to free ground reachable from start or goal, so no passage becomes wider. The key `source` of the world file
-    states the overhang of cylinders beyond blocked cells.
+    World files consist of upright cylinders. SDF cylinders are kept as they are. Cylinders cover all other shapes in SDF,
+    and in a map every blocked cell next to free ground reachable from start or goal, so no passage becomes wider. The key
+    `source` of the world file states how far they reach beyond, and what was ignored.
     """
+    from antdrive.base.plane import format_point
     from antdrive.worlds import import_file, save_task
     from antdrive.worlds.formats.cellmap import conversion_progress
     from antdrive.worlds.formats.importing import IMPORTS, import_format
@@ -269,6 +275,7 @@ def import_world(
                 bounds=numbers("--bounds", bounds, 4),
                 cell=given["cell"],
                 barn=barn,
+                band=numbers("--band", band, 2, "LOW,HIGH"),
                 skip_unsupported=skip_unsupported or None,
                 on_skipped=skipped.extend if skip_unsupported else None,
                 unknown=unknown,
@@ -289,15 +296,18 @@ def import_world(
     lines = []
     if len(tasks) == 1:
         world = tasks[0].world
-        first, *more = (world.source or "").split("; ")
+        first, *more = str(world.source).split("; ")
         lines += [f"{world.name}: {len(world.obstacles)} obstacles, {first}", *(f"  {part}" for part in more)]
         if unknown is None and OF_SHADE in str(world.source):
             lines.append("  --unknown free or --unknown blocked decides on these cells")
-        if file_format.is_map and len(world.obstacles) > MANY:
+        if "bounds" in file_format.options and not (start and goal):
+            ends = f"start {format_point(tasks[0].start[:2], 2)}, goal {format_point(tasks[0].goal, 2)}"
+            lines.append(f"  {ends}; choose others with --start and --goal")
+        if "overhang" in file_format.options and len(world.obstacles) > MANY:
             lines.append(f"  planning takes seconds beyond {MANY} obstacles; a larger --overhang needs fewer")
     if skip_unsupported:
         imported[0]["skipped"] = skipped
-        lines.append(f"  kept {len(tasks[0].world.obstacles)} cylinders, skipped {len(skipped)} parts")
+        lines.append(f"  skipped {len(skipped)} parts")
         lines += [f"  skipped  {part}" for part in skipped]
     lines += [line for file in files for line in file_lines({"world": file})]
     show(json, {"worlds": imported} if is_set else imported[0], lines)

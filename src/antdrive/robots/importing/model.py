@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
-import itertools
 import math
 import os
 import re
@@ -29,47 +28,18 @@ from antdrive.base.checks import suggest
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.files import open_regular, read_bytes
 from antdrive.base.optional import optional
+from antdrive.base.ros import ros_package
 from antdrive.base.types import Floats
 from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
+from antdrive.worlds.formats.meshes import read_mesh
 from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml
 
-MAX_NESTED = 6  # folders between a workspace and a package
-PREFIXES = ("AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH", "CMAKE_PREFIX_PATH")
 STAND_IN = f"{os.sep}missing package "  # start of the path of a missing package
 
 
 def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Path | None:
-    """Return a package's folder; None if missing.
-
-    The given one comes first, then one above or beside the file, then those of ROS' own variables.
-    """
-    if name in packages:
-        return packages[name]
-    above = source.resolve().parents
-    own = (folder for folder in above if _is_package(folder, name))
-    beside = (parent / name for parent in above)
-    shared = (Path(prefix, "share", name) for key in PREFIXES for prefix in _folders(key))
-    folders = itertools.chain(own, beside, shared, _in_workspaces(name))
-    return next((folder for folder in folders if folder.is_dir()), None)
-
-
-def _is_package(folder: Path, name: str) -> bool:
-    file = folder / "package.xml"
-    return file.is_file() and f"<name>{name}</name>" in file.read_text(encoding="utf-8", errors="replace")
-
-
-def _folders(variable: str) -> list[str]:
-    return [folder for folder in os.environ.get(variable, "").split(os.pathsep) if folder]
-
-
-def _in_workspaces(name: str) -> Iterator[Path]:
-    """Yield the folders of a package at or below those of ROS_PACKAGE_PATH."""
-    for workspace in _folders("ROS_PACKAGE_PATH"):
-        for folder, inside, files in os.walk(workspace):
-            if os.path.basename(folder) == name or _is_package(Path(folder), name):
-                yield Path(folder)
-            if "package.xml" in files or folder.count(os.sep) - workspace.count(os.sep) >= MAX_NESTED:
-                inside.clear()
+    """Return a package's folder, the given one first; None if missing."""
+    return packages.get(name) or ros_package(name, source)
 
 
 def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> tuple[str, Missing]:
@@ -233,9 +203,6 @@ SIDE = re.compile(r"^(?:front|rear|back|middle)?_?(left|right)(?=\w*joint$)", re
 SUBSTITUTION = re.compile(r"\$\((?:find|arg|env|optenv|eval|dirname|cwd)\b")  # of xacro
 MAX_LINKS = 10_000
 MAX_COORDINATE = 1e6  # [m]
-MAX_MESH_BYTES = 20_000_000  # 400,000 triangles of a binary STL file
-CHECKED = ("stl", "obj", "dae")  # mesh formats whose numbers are checked before trimesh reads them
-_VERTEX = re.compile(rb"^[ \t]*v(?:ertex)?[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -636,16 +603,7 @@ class _Shapes:
                 )
             self.missing_meshes.append(f"{link}: {name}")
             return None
-        content, kind = checked_mesh(file), file.suffix.lower().removeprefix(".")
-        trimesh = optional("trimesh", "urdf", f"mesh {file.name} needs it")
-        try:  # trimesh merges vertices, and with them drops those that are not numbers: checked before
-            loaded = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=kind in CHECKED)
-            vertices = np.asarray(loaded.vertices, dtype=np.float64)
-        except Exception as error:  # each format has its own exceptions
-            raise input_error(str(file), f"cannot be read as a mesh: {error or type(error).__name__}") from None
-        if not len(vertices) or not np.isfinite(vertices).all():
-            raise input_error(str(file), "has no vertices, or vertices that are not finite")
-        return vertices * _unit(file)
+        return read_mesh(file)[0]
 
     def _candidates(self, name: str) -> Iterator[Path]:
         """Yield candidate paths of a mesh; package://NAME/FILE resolves below a folder NAME or the given folder."""
@@ -658,37 +616,3 @@ class _Shapes:
             yield folder / bare
             yield folder / inside
             yield folder / Path(bare).name
-
-
-def checked_mesh(file: Path) -> bytes:
-    """Return a mesh file's content; raise InputError if it is too large, or a coordinate is not a finite number."""
-    content, kind = read_bytes(file, MAX_MESH_BYTES, "a mesh"), file.suffix.lower().removeprefix(".")
-    count = int.from_bytes(content[80:84], "little")
-    try:
-        if kind == "stl" and len(content) == 84 + 50 * count:
-            layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-            numbers = np.frombuffer(content, layout, offset=84)["corners"]
-        elif kind in ("stl", "obj"):
-            numbers = np.array(_VERTEX.findall(content), dtype=np.bytes_).astype(np.float64)
-        elif kind == "dae":
-            lists = (e.text or "" for e in parse_xml(file).iter() if e.tag.rpartition("}")[2] == "float_array")
-            numbers = np.array(" ".join(lists).split(), dtype=np.float64)
-        else:
-            return content
-    except ValueError as error:
-        raise (error if isinstance(error, InputError) else input_error(str(file), f"not a mesh: {error}")) from None
-    if not numbers.size or not np.isfinite(numbers).all():
-        bad = int(numbers.size - np.isfinite(numbers).sum())
-        raise input_error(str(file), f"{bad} of its coordinates are not finite" if bad else "has no vertices")
-    return content
-
-
-def _unit(file: Path) -> float:
-    """Return the unit of a mesh file [m]. COLLADA states it, but trimesh ignores it; other formats have none.
-
-    As in RViz and Gazebo, the file's up axis is ignored.
-    """
-    if file.suffix.lower() != ".dae":
-        return 1.0
-    unit = next((element for element in parse_xml(file).iter() if element.tag.rpartition("}")[2] == "unit"), None)
-    return _greater_than_0(file, "<unit>", "meter", _number(file, unit, "meter", 1.0))

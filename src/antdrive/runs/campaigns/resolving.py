@@ -134,7 +134,7 @@ def _imported(
     for path in _files(campaign, (*place, "import"), pattern, ""):
         for problem in problems:
             try:
-                anywhere = (drawn and import_format(path, barn=barn).is_map) or None
+                anywhere = (drawn and "anywhere" in import_format(path, barn=barn).options) or None
                 tasks = import_file(path, barn=barn, problem=problem, anywhere=anywhere, **options)
             except FieldError as error:
                 raise campaign.error((*place, error.key), error.problem) from None

@@ -29,6 +29,7 @@ REACHABLE_DONE, DISTANCES_DONE = 0.1, 0.5  # progress after the flood fill and a
 SLACK = 1e-9  # added to discs' radii against rounding; smaller overlaps are ignored [m]
 CORNER = (math.sqrt(2.0) - 1.0) / 2.0  # overhang of the disc around one cell [cells]
 CAP = 32  # largest depth of a disc's centre in blocked cells [half cells]; deeper ones save few discs
+COARSE = 8  # cells along a side of a block of cells, for the insides of large blocked areas
 MOST_EROSIONS = 20  # for the start and goal of the largest ground [cells]
 TOLERANCE = 0.25  # default goal tolerance of a map's task [m]
 
@@ -45,6 +46,15 @@ def conversion_progress(report: Callable[[float], None]) -> Iterator[None]:
         yield
     finally:
         _report.reset(token)
+
+
+@contextmanager
+def progress_part(number: int, count: int) -> Iterator[None]:
+    """Count what happens within the context as one of several parts of a conversion."""
+    report = _report.get()
+    with conversion_progress(lambda fraction: None):
+        yield
+    report((number + 1) / count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,10 +150,10 @@ def _window(edges: Floats, centre: float, radius: float) -> tuple[int, int]:
     return min(max(first, 0), last), min(max(stop, 0), last)
 
 
-def cover(cells: CellMap, overhang: float | None = None) -> Cover:
-    """Cover the blocked cells adjacent to free ones with few discs, chosen greedily.
+def cover(cells: CellMap, overhang: float | None = None, needed: Cells | None = None) -> Cover:
+    """Cover the needed blocked cells, by default those adjacent to free ones, with few discs, chosen greedily.
 
-    The discs leave no passage that the map does not have. Blocked cells without a free neighbour are omitted.
+    The discs leave no passage that the map does not have. By default, blocked cells without a free neighbour are omitted.
     """
     from antdrive.worlds.formats import _kernels_cover as kernels
 
@@ -158,7 +168,7 @@ def cover(cells: CellMap, overhang: float | None = None) -> Cover:
         rows, cols = free.shape
         raise input_error("map", f"has {rows} x {cols} reachable cells; the limit is {MAX_COVERED}")
     _report.get()(REACHABLE_DONE)
-    needed = _beside(free) & ~free
+    needed = _beside(free) & ~free if needed is None else needed
     # Treat the map as surrounded by free cells, so that no disc reaches beyond it.
     distance2 = np.empty((2 * free.shape[0] + 5, 2 * free.shape[1] + 5), dtype=np.int32)
     kernels.squared_distances(np.pad(free, 1, constant_values=True), CAP, distance2)
@@ -172,6 +182,18 @@ def cover(cells: CellMap, overhang: float | None = None) -> Cover:
     discs = np.column_stack([x0 + j * (cell / 2), y0 + i * (cell / 2), radius * cell + SLACK])
     out = float((radius - np.sqrt(inside2) / 2).max(initial=0.0)) * cell
     return Cover(discs, int(needed.sum()), out)
+
+
+def cover_inside(blocked: Cells, cell: float, corner: Point, overhang: float) -> Cover:
+    """Cover all of the given blocked cells (R, C), their insides with large discs that reach nowhere beyond."""
+    rows, cols = blocked.shape
+    padded = np.pad(blocked, ((0, -rows % COARSE), (0, -cols % COARSE)))
+    coarse = np.pad(padded.reshape(padded.shape[0] // COARSE, COARSE, -1, COARSE).all(axis=(1, 3)), 1)
+    deep = (coarse & ~_beside(~coarse))[1:-1, 1:-1]
+    inner = cover(CellMap(~deep, cell * COARSE, corner), needed=deep)
+    rim = blocked & ~deep.repeat(COARSE, 0).repeat(COARSE, 1)[:rows, :cols]
+    outer = cover(CellMap(~blocked, cell, corner), overhang, rim)
+    return Cover(np.vstack([inner.discs, outer.discs]), int(blocked.sum()), outer.overhang)
 
 
 def _beside(cells: Cells) -> Cells:

@@ -29,7 +29,6 @@ class Format:
     suffixes: tuple[str, ...]  # in lower case
     options: tuple[str, ...]  # the options of `read` besides the path
     read: Callable[..., list[Task]]  # reads the tasks in a file
-    is_map: bool = False  # whether the files are maps of cells, covered with cylinders on import
 
 
 def _read_map_server(path: Path, unknown: str | None = None, **options: Any) -> list[Task]:
@@ -44,7 +43,7 @@ IMPORTS: Mapping[str, Format] = MappingProxyType(
         "sdf": Format(
             "an SDF world",
             (".sdf", ".world"),
-            ("start", "goal", "bounds", "cell", "skip_unsupported", "on_skipped"),
+            ("start", "goal", "bounds", "cell", "band", "resolution", "overhang", "skip_unsupported", "on_skipped"),
             lambda path, **options: [import_sdf(path, **options)],
         ),
         "barn": Format(
@@ -55,14 +54,12 @@ IMPORTS: Mapping[str, Format] = MappingProxyType(
             (".yaml", ".yml"),
             ("start", "goal", "cell", "unknown", "overhang", "anywhere"),
             _read_map_server,
-            is_map=True,
         ),
         "movingai": Format(
             "a MovingAI map",
             (".map",),
             ("start", "goal", "cell", "overhang", "resolution", "problem", "scen", "anywhere"),
             lambda path, **options: [import_movingai_task(path, **options)],
-            is_map=True,
         ),
         "dynabarn": Format("a DynaBARN set", (".json",), ("cell",), import_dynabarn),
     }

@@ -1,172 +1,29 @@
-"""Import and export of Gazebo worlds (SDF) with static upright cylinders."""
+"""Import of Gazebo worlds (SDF), and export of worlds as static upright cylinders."""
 
 from __future__ import annotations
 
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 from xml.sax.saxutils import quoteattr
 
-import numpy as np
-
 from antdrive.base.atomic import write_text
-from antdrive.base.errors import FieldError, input_error
+from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.plane import map_to_world
-from antdrive.base.types import Bounds, Floats, Point, Pose
+from antdrive.base.types import Bounds, Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
-from antdrive.worlds.formats.xml import parse_xml, rotation_matrix
+from antdrive.worlds.formats.sdf_models import ACTOR_RADIUS, VARIABLES, Models, SdfReader
+from antdrive.worlds.formats.solids import BAND, cover_pieces, floor_height
+from antdrive.worlds.formats.xml import parse_xml
 from antdrive.worlds.world import Disc, Task, World
 
-MAX_TILT = 1e-3  # largest tilt of an upright cylinder [rad]
-
-
-class Unsupported(Exception):
-    """A model that is not made of upright cylinders; the message is the reason."""
-
-
-@dataclass
-class Models:
-    """The models of a world."""
-
-    discs: list[Disc] = field(default_factory=list)  # the upright cylinders
-    unsupported: list[str] = field(default_factory=list)  # all other parts, each as "name (reason)"
-
-
-def read_models(world: ET.Element, frame: Pose = (0.0, 0.0, 0.0)) -> Models:
-    """Read the models of a <world>.
-
-    Ground planes and models without collision geometry are ignored. As in Gazebo, the poses in a <state> replace the
-    models' own: model and link poses in the state are in the world's frame, and its <scale> applies to the cylinders.
-    """
-    models = Models()
-    wanted = _Wanted(frame)
-    states = {s.get("name", ""): s for s in world.findall("state/model")}
-    for model in world.findall("model"):
-        name = model.get("name", "without a name")
-        _add_cylinders(models, model, name, wanted, False, states.get(name))
-    for include in world.iter("include"):
-        uri = (include.findtext("uri") or "").strip()
-        if uri.rpartition("/")[2] not in ("sun", "ground_plane"):
-            models.unsupported.append(f"{uri or 'include'} (included from another file)")
-    for tag in ("actor", "population", "state/insertions/model"):
-        models.unsupported.extend(f"{e.get('name', tag)} ({tag})" for e in world.findall(tag))
-    return models
-
-
-class _Wanted:
-    """A transform from a <world>'s frame to another frame."""
-
-    def __init__(self, frame: Pose) -> None:
-        x, y, yaw = frame
-        self._same = not any(frame)
-        self._frame = _matrix(x, y, 0.0, 0.0, 0.0, yaw)
-        self._back = np.linalg.inv(self._frame)
-
-    def __matmul__(self, pose: Floats) -> Floats:
-        """Transform a pose (4, 4). The frame's own pose becomes the exact identity."""
-        if self._same:
-            return pose
-        return np.eye(4) if np.array_equal(pose, self._frame) else np.asarray(self._back @ pose)
-
-
-def _add_cylinders(
-    models: Models, model: ET.Element, name: str, frame: Floats | _Wanted, static: bool, state: ET.Element | None
-) -> None:
-    """Add a model's cylinders and those of its nested models; `frame` is the parent's pose (4, 4) or the world's.
-
-    Each collision stands for itself: an unsupported one is named, and the others stay.
-    """
-    static = static or (model.findtext("static") or "").strip().lower() in ("1", "true")
-    try:
-        if model.get("placement_frame"):
-            raise Unsupported("has a placement_frame")
-        pose = frame @ _pose(model)
-        scale, links = np.ones(3), {}
-        if state is not None:
-            pose = frame @ _pose(state) if state.find("pose") is not None else pose
-            scale = _numbers(state.findtext("scale") or "1 1 1", 3, "scale")
-            links = {
-                link.get("name"): frame @ _pose(link) for link in state.findall("link") if link.find("pose") is not None
-            }
-    except Unsupported as reason:
-        models.unsupported.append(f"{name} ({reason})")
-        return
-    for link in model.findall("link"):
-        for collision in link.findall("collision"):
-            part = "::".join((name, *(element.get("name") or element.tag for element in (link, collision))))
-            try:
-                place = links[link.get("name")] if link.get("name") in links else pose @ _pose(link)
-                found = list(_shape(collision, place @ _pose(collision), scale))
-                if found and not static:
-                    raise Unsupported("not static")
-                models.discs.extend(found)
-            except Unsupported as reason:
-                models.unsupported.append(f"{part} ({reason})")
-    for inner in model.findall("model"):
-        _add_cylinders(models, inner, f"{name}::{inner.get('name', 'without a name')}", pose, static, None)
-
-
-def _shape(collision: ET.Element, pose: Floats, scale: Floats) -> Iterator[Disc]:
-    """Yield the cylinder of a collision; nothing for a floor or a cylinder wholly below z = 0."""
-    shape = collision.find("geometry/*")
-    if shape is None or shape.tag == "empty":
-        return
-    if shape.tag == "plane":
-        normal = pose[:3, :3] @ _numbers(shape.findtext("normal") or "0 0 1", 3, "normal")
-        if math.hypot(normal[0], normal[1]) > MAX_TILT * abs(normal[2]):
-            raise Unsupported("a plane that is not horizontal")
-        return
-    if shape.tag != "cylinder":
-        raise Unsupported(shape.tag)
-    if math.hypot(pose[0, 2], pose[1, 2]) > MAX_TILT:
-        raise Unsupported("a tilted cylinder")
-    radius, length = (float(_numbers(shape.findtext(tag) or "", 1, tag)[0]) for tag in ("radius", "length"))
-    if abs(scale[0] - scale[1]) > 1e-9 or not (scale > 0).all():
-        raise Unsupported("scaled to an ellipse")
-    radius, length = radius * float(scale[0]), length * float(scale[2])
-    if not (radius > 0 and length > 0):
-        raise Unsupported(f"a cylinder of radius {radius:g} and length {length:g}")
-    x, y, z = (float(v) for v in pose[:3, 3])
-    top = z + length / 2
-    if top > 0:
-        yield Disc(x, y, radius, top)
-
-
-def _pose(element: ET.Element) -> Floats:
-    """Return the transform (4, 4) of an element's <pose>: x y z [m] roll pitch yaw [rad], about fixed axes."""
-    pose = element.find("pose")
-    if pose is None or not (pose.text or "").strip():
-        return np.eye(4)
-    for key in ("frame", "relative_to", "rotation_format"):
-        if pose.get(key) and (key, pose.get(key)) != ("rotation_format", "euler_rpy"):
-            raise Unsupported(f"a pose with {key}={pose.get(key)!r}")
-    x, y, z, *angles = _numbers(pose.text or "", 6, "pose")
-    if (pose.get("degrees") or "").lower() in ("1", "true"):
-        angles = [math.radians(a) for a in angles]
-    return _matrix(x, y, z, *angles)
-
-
-def _matrix(x: float, y: float, z: float, *angles: float) -> Floats:
-    """Return the transform (4, 4) of a position [m] and of roll, pitch and yaw about fixed axes [rad]."""
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rotation_matrix(*angles), (x, y, z)
-    return matrix
-
-
-def _numbers(text: str, count: int, key: str) -> Floats:
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        values = np.empty(0)
-    if len(values) != count or not np.isfinite(values).all():
-        raise Unsupported(f"{key} must be {count} numbers, got {text.strip()[:40]!r}")
-    return values
-
-
+MOST_SLOPING = 25.0  # of an imported world without a remark [m2]
+MOST_CELLS = 5_000_000  # of a task's default grid
+FINE = 0.1  # default grid resolution of a task with covered shapes [m]
 MARGIN = 1.0  # from the cylinders to the default bounds [m]
 CELL = 0.25  # default grid resolution of a task [m]
 TOLERANCE = 0.25  # default goal tolerance [m]
@@ -186,58 +43,104 @@ def import_sdf(
     bounds: Bounds | None = None,
     cell: float | None = None,
     goal_tolerance: float | None = None,
+    band: tuple[float, float] | None = None,
+    resolution: float | None = None,
+    overhang: float | None = None,
     skip_unsupported: bool = False,
     on_skipped: Callable[[list[str]], None] | None = None,
 ) -> Task:
-    """Import the upright cylinders of a Gazebo world as a task.
+    """Import a Gazebo world, or a model, as a task.
 
-    Poses of models, links and collisions are composed; those in <state> replace the models' own, as in Gazebo.
-    A cylinder's height is its top's above z = 0. Ground planes, models without collision geometry and everything below
-    the floor are ignored. Worlds written by `export_sdf` have their own defaults, including the `frame`.
+    What collision shapes fill between two heights becomes obstacles. Upright cylinders and spheres become one cylinder
+    each. All other shapes are covered: no point of them stays free, and the world's source states the largest protrusion.
+    Bodies that could move stand as they are; actors with a trajectory become movers. Robots are left out, with anything
+    that has no collision shape. Worlds written by `export_sdf` have their own defaults, including the `frame`.
 
     Args:
         path: the SDF file
         start: the robot's start pose in the file's coordinates [m, m, rad]; by default at the lower left, towards the goal
         goal: the goal position in the file's coordinates [m]; by default at the upper right
-        bounds: the walls' inner faces, in the world's own frame [m]; by default 1 m around the cylinders, start and goal
-        cell: the task's grid resolution [m]; by default 0.25
+        bounds: the walls' inner faces, in the world's own frame [m]; by default 1 m around the obstacles, start and goal
+        cell: the task's grid resolution [m]; by default 0.25, or 0.1 with covered shapes
         goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
-        skip_unsupported: skip moving and included models and other collision shapes instead of refusing the file
+        band: heights between which shapes are obstacles [m]; by default 0.01 and 2 above the floor
+        resolution: side of the cells on which shapes are covered [m]; by default 0.02, or more in large worlds
+        overhang: largest protrusion of cylinders beyond these cells [m]; by default their side
+        skip_unsupported: skip unsupported parts and missing models instead of refusing the file
         on_skipped: called with what is skipped, each part as "model::link::collision (reason)"
 
     Raises:
-        InputError: the file is unreadable, or a model in it is not supported.
+        InputError: the file is unreadable, or a model in it is missing or not supported.
     """
     file = Path(path)
     world = _world_element(file)
     kept = _KeptTask.take(file, world)
     frame = kept.numbers("frame", 3) or (0.0, 0.0, 0.0)
-    models = read_models(world, frame)
-    if models.unsupported and not skip_unsupported:
-        raise input_error(str(file), _about_unsupported(models))
+    if band is not None and not 0 <= band[0] < band[1]:
+        raise FieldError("band", f"must be two heights, LOW,HIGH with 0 <= LOW < HIGH, got {band[0]:g},{band[1]:g}")
+    known = (float(band[0]), float(band[1])) if band else (0.0, math.inf) if kept.values else None
+    try:
+        reader = SdfReader(file)
+        models = reader.read(world, frame, known or BAND)
+        if known is None and (floor := floor_height(models.solids)):
+            above = reader.read(world, frame, (BAND[0] + floor, BAND[1] + floor), floor)
+            models = above if above.kinds else models
+        if (models.unsupported or models.missing) and not skip_unsupported:
+            raise InputError(_about_unsupported(models))
+        covering, reach = cover_pieces(models.solids, models.band, resolution, overhang)
+    except InputError as error:
+        raise input_error(str(file), str(error)) from None
     if on_skipped is not None:
-        on_skipped(models.unsupported)
+        on_skipped([*models.unsupported, *(f"{uri} (not found)" for uri in models.missing)])
+    discs = [*models.discs, *covering]
     start = _in_world(frame, start) or kept.numbers("start", 3)
     goal = _in_world(frame, goal) or kept.numbers("goal", 2)
     bounds = bounds or kept.numbers("bounds", 4)
     if bounds is None:
-        bounds = _bounds_around(file, models.discs, start, goal)
+        bounds = _bounds_around(file, discs, start, goal)
     goal = goal or (bounds[2] - MARGIN / 2, bounds[3] - MARGIN / 2)
     if start is None:
         x, y = bounds[0] + MARGIN / 2, bounds[1] + MARGIN / 2
         start = x, y, math.atan2(goal[1] - y, goal[0] - x)
+    about = "; ".join([f"imported from {file.name}", *_about(models, len(covering), reach)])
     try:
         return Task(
-            World(kept.text("name", file.stem), bounds, tuple(models.discs), kept.source),
+            World(
+                kept.text("name", file.stem),
+                bounds,
+                tuple(discs),
+                kept.values.get("source") if kept.values else about,
+                tuple(models.movers),
+            ),
             start,
             goal,
             kept.number("goal_tolerance", TOLERANCE) if goal_tolerance is None else goal_tolerance,
-            kept.number("cell", CELL) if cell is None else cell,
+            kept.number("cell", _cell(bounds, FINE if covering else CELL)) if cell is None else cell,
             kept.number("time_limit", None),
             frame=frame,
         )
     except FieldError as error:
         raise input_error(str(file), str(error)) from None
+
+
+def _about(models: Models, covering: int, reach: float) -> Iterator[str]:
+    """Yield what was imported, assumed and ignored."""
+    low, high = models.band
+    if models.floor:
+        yield f"the floor is {models.floor:g} m high: low plates cover most of the ground"
+    if covering:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(models.kinds.items()))
+        yield (
+            f"the shapes between {low:g} and {high:g} m ({kinds}) are fully covered; {covering} of the cylinders "
+            f"cover what is not upright and round, and reach at most {reach + models.facets:.3g} m beyond it"
+        )
+    if models.sloping > MOST_SLOPING:
+        yield f"sloping ground, taken for obstacles: {models.sloping:.0f} m2"
+    if models.movers:
+        yield f"actors as movers of radius {ACTOR_RADIUS:g} m, in straight lines: {len(models.movers)}"
+    names = {"flat": f"shapes up to {low:g} m, taken for floor", "above": f"shapes above {high:g} m, no obstacles"}
+    for what, count in models.counts.items():
+        yield what if what.startswith("left out") else f"{names.get(what, what)}: {count}"
 
 
 def _in_world(frame: Pose, end: Any) -> Any:
@@ -247,10 +150,12 @@ def _in_world(frame: Pose, end: Any) -> Any:
 
 def _world_element(file: Path) -> ET.Element:
     root = parse_xml(file)
+    if any(element.tag.startswith("xacro:") for element in root.iter()):
+        raise input_error(str(file), f"is a xacro file; expand it first: xacro {file.name} > expanded.sdf")
     world = root.find("world") if root.tag == "sdf" else None
-    if world is None:
-        raise input_error(str(file), f"must be an <sdf> with a <world> in it, got <{root.tag}>")
-    return world
+    if world is None and (root.tag != "sdf" or root.find("model") is None):
+        raise input_error(str(file), f"must be an <sdf> with a <world> or a <model> in it, got <{root.tag}>")
+    return root if world is None else world
 
 
 @dataclass(frozen=True)
@@ -269,10 +174,6 @@ class _KeptTask:
         for model in [m for m in world.findall("model") if m.get("name") == WALLS]:
             world.remove(model)
         return cls(file, dict(element.attrib))
-
-    @property
-    def source(self) -> str | None:
-        return self.values.get("source") if self.values else f"imported from {self.file.name}"
 
     def text(self, key: str, default: str) -> str:
         return self.values.get(key, default)
@@ -297,15 +198,27 @@ class _KeptTask:
 
 
 def _about_unsupported(models: Models) -> str:
-    more = len(models.unsupported) - 5
-    names = ", ".join(models.unsupported[:5]) + (f" and {more} more" if more > 0 else "")
-    return f"only static models of upright cylinders can be imported; remove or skip {names}"
+    """Return in one line what of a world cannot be imported, and what helps."""
+    problems = []
+    if models.missing:
+        folders = f"name their folder in {VARIABLES[0]} (or {', '.join(VARIABLES[1:])})"
+        fuel = (
+            "; download Fuel's with: gz fuel download -u URL" if any("://fuel" in uri for uri in models.missing) else ""
+        )
+        problems.append(
+            f"models and meshes not found ({len(models.missing)}): {', '.join(models.missing)}; {folders}{fuel}"
+        )
+    if models.unsupported:
+        more = len(models.unsupported) - 5
+        names = ", ".join(models.unsupported[:5]) + (f" and {more} more" if more > 0 else "")
+        problems.append(f"parts that cannot be imported ({len(models.unsupported)}): {names}")
+    return "; ".join([*problems, "--skip-unsupported leaves them out"])
 
 
 def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
-    """Return bounds `MARGIN` around the cylinders, start and goal; raise InputError without cylinders."""
+    """Return bounds `MARGIN` around the obstacles, start and goal; raise InputError without obstacles."""
     if not discs:
-        raise input_error(str(file), "has no upright cylinder; give the bounds")
+        raise input_error(str(file), "has no obstacles between the floor and the robot's height; give the bounds")
     spots = [(d.x, d.y, d.radius) for d in discs]
     spots += [(end[0], end[1], 0.0) for end in (start, goal) if end is not None]
     return (
@@ -314,6 +227,12 @@ def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Poin
         max(x + r for x, _, r in spots) + MARGIN,
         max(y + r for _, y, r in spots) + MARGIN,
     )
+
+
+def _cell(bounds: Bounds, cell: float) -> float:
+    """Return the default grid resolution, doubled until the grid has at most `MOST_CELLS` cells [m]."""
+    area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
+    return _cell(bounds, 2 * cell) if MOST_CELLS * cell * cell < area < math.inf else cell
 
 
 def export_sdf(task: Task, path: str | Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -16,12 +17,20 @@ from antdrive.base.types import Floats
 
 MAX_BYTES = 50_000_000  # BARN's worlds have 0.7 MB
 MAX_DEPTH = 100
+_SPACE = re.compile(rb"^\s+(?=<\?xml)")  # before the declaration: Gazebo accepts it, too
+_COMMENT = re.compile(rb"<!\[CDATA\[.*?\]\]>|<!--.*?-->", re.DOTALL)
+
+
+def _blank(found: re.Match[bytes]) -> bytes:
+    """Return a comment's line breaks: Gazebo accepts `--` in comments, unlike XML."""
+    return b"\n" * found[0].count(b"\n") if found[0].startswith(b"<!--") else found[0]
 
 
 def parse_xml(path: Path) -> ET.Element:
     """Parse an XML file and return its root element."""
-    content = read_bytes(path, MAX_BYTES, "an XML file")
+    content = _SPACE.sub(b"", _COMMENT.sub(_blank, read_bytes(path, MAX_BYTES, "an XML file")))
     parser, builder, depth = expat.ParserCreate(), ET.TreeBuilder(), 0
+    parser.buffer_text = True
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth

@@ -27,8 +27,8 @@ def test_a_gazebo_world_is_imported_and_driven(antdrive, tmp_path):
 
 def test_everything_that_is_skipped_is_printed(antdrive, tmp_path):
     post = "<geometry><cylinder><radius>0.2</radius><length>1</length></cylinder></geometry>"
-    box = "<geometry><box><size>1 1 1</size></box></geometry>"
-    parts = "".join(f"<collision name='c{i}'>{shape}</collision>" for i, shape in enumerate([box] * 7 + [post]))
+    hill = "<geometry><heightmap/></geometry>"
+    parts = "".join(f"<collision name='c{i}'>{shape}</collision>" for i, shape in enumerate([hill] * 7 + [post]))
     (tmp_path / "one.world").write_text(
         "<sdf version='1.6'><world name='one'><model name='m'><static>1</static>"
         f"<link name='l'>{parts}</link></model></world></sdf>"
@@ -36,9 +36,23 @@ def test_everything_that_is_skipped_is_printed(antdrive, tmp_path):
     words = ("worlds", "import", "one.world", "--skip-unsupported", "--start=1,1,0", "--goal", "4,2")
     code, out, err = antdrive(*words)
     assert (code, err) == (0, "")
-    named = [f"m::l::c{i} (box)" for i in range(7)]
-    assert out.splitlines()[1:9] == ["  kept 1 cylinders, skipped 7 parts", *(f"  skipped  {name}" for name in named)]
+    named = [f"m::l::c{i} (uneven ground)" for i in range(7)]
+    assert out.splitlines()[1:9] == ["  skipped 7 parts", *(f"  skipped  {name}" for name in named)]
     assert json.loads(antdrive(*words, "--json", "-o", "two.yaml")[1])["skipped"] == named
+
+
+def test_the_chosen_ends_and_each_remark_have_a_line(antdrive, tmp_path):
+    box = "<collision name='c'><pose>2 3 0.5 0 0 0</pose><geometry><box><size>1 1 1</size></box></geometry></collision>"
+    (tmp_path / "one.world").write_text(f"<sdf version='1.6'><model name='m'><link name='l'>{box}</link></model></sdf>")
+    code, out, err = antdrive("worlds", "import", "one.world", "--resolution=0.05", "--band=0.2,1")
+    assert (code, err) == (0, "")
+    assert "  the shapes between 0.2 and 1 m (1 box) are fully covered" in out.splitlines()
+    assert "  bodies that could move, taken to stand still: 1" in out.splitlines()
+    assert "--start and --goal" in out
+    assert (
+        "--start and --goal"
+        not in antdrive("worlds", "import", "one.world", "--start=0,0,0", "--goal=4,4", "-o", "w.yaml")[1]
+    )
 
 
 #: A building of 8 x 6 m, 0.1 m to a character: four rooms, three doors of 0.9 m, a table, and a corner that nobody has seen.

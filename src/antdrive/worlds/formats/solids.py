@@ -1,0 +1,253 @@
+"""Collision shapes of SDF as exact discs or convex pieces, and the discs that cover pieces between two heights.
+
+A piece is the convex hull of a few points. The shape of each piece over the floor, between the heights, is rasterised on a
+lattice through the origin: cells that it reaches into are blocked, and `cellmap.cover` covers them.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from antdrive.base.errors import input_error
+from antdrive.base.plane import tidy
+from antdrive.base.types import Floats
+from antdrive.worlds.formats.cellmap import MAX_DISCS, SLACK, cover_inside, progress_part
+from antdrive.worlds.limits import MAX_COORDINATE
+from antdrive.worlds.world import Disc
+
+MAX_TILT = 1e-3  # largest tilt of an upright cylinder [rad]
+ROUND = ("cylinder", "sphere", "cone", "capsule", "ellipsoid")
+SIDES, ARC = 64, 32  # of a polygon around a circle, and of one around half of a circle
+FACETS = 1 / (math.cos(math.pi / SIDES) * math.cos(math.pi / ARC / 2)) - 1  # how far these reach beyond it [radii]
+TILE = 512  # cells along a side of an area that is rasterised at once
+MAX_TILES = 500  # with obstacles
+BAND = (0.01, 2.0)  # default heights between which shapes are obstacles, above the floor [m]
+CELL, COARSEST = 0.02, 1.0  # smallest and largest default side of a cell [m]
+MOST_RIMS = 60_000  # sides of blocked cells along free ones, of default cells: about 8,000 discs
+HIGHEST_FLOOR = 0.3  # of plates that cover most of the ground [m]
+MAX_POINTS = 10_000  # of a polyline
+
+
+class Unsupported(Exception):
+    """A part of a world that cannot be imported; the message is the reason."""
+
+
+def numbers(text: str | None, count: int, key: str) -> Floats:
+    """Parse so many finite numbers."""
+    try:
+        values = np.array([float(word) for word in (text or "").split()])
+    except ValueError:
+        values = np.empty(0)
+    if len(values) != count or not (np.abs(values) <= MAX_COORDINATE).all():
+        raise Unsupported(
+            f"{key} must be {f'{count} numbers' if count > 1 else 'a number'}, got {(text or '').strip()[:40]!r}"
+        )
+    return values
+
+
+def _sizes(shape: ET.Element, *keys: str) -> list[float]:
+    values = [float(numbers(shape.findtext(key), 1, key)[0]) for key in keys]
+    if not min(values) > 0:
+        raise Unsupported(f"a {shape.tag} of {' and '.join(f'{k} {v:g}' for k, v in zip(keys, values, strict=True))}")
+    return values
+
+
+def _round(shape: ET.Element) -> tuple[Floats, Floats]:
+    """Return the profile of a body of revolution about z, (P, 2): z and radius, and the factors that stretch it, (3,)."""
+    half = np.linspace(-math.pi / 2, math.pi / 2, ARC + 1)
+    arc = np.column_stack([np.sin(half), np.cos(half)]) / math.cos(math.pi / ARC / 2)
+    if shape.tag == "sphere":
+        return arc * _sizes(shape, "radius")[0], np.ones(3)
+    if shape.tag == "ellipsoid":
+        radii = numbers(shape.findtext("radii"), 3, "radii")
+        if not (radii > 0).all():
+            raise Unsupported(f"an ellipsoid of radii {radii.min():g}")
+        return arc, radii
+    radius, length = _sizes(shape, "radius", "length")
+    ends = np.array([(-length / 2, radius), (length / 2, 0.0 if shape.tag == "cone" else radius)])
+    if shape.tag != "capsule":
+        return ends, np.ones(3)
+    return arc * radius + np.sign(arc[:, :1]) * [length / 2, 0.0], np.ones(3)
+
+
+def _upright(profile: Floats, place: Floats, low: float, high: float) -> Disc | None:
+    """Return the disc of a body of revolution about an upright axis; None if nothing of it is between the heights."""
+    z, radius = place[2, 3] + place[2, 2] * profile[:, 0], math.hypot(*place[:2, 0]) * profile[:, 1]
+    order = np.argsort(z, kind="stable")
+    inside = radius[(z > low) & (z < high)].tolist()
+    inside += [np.interp(h, z[order], radius[order]) for h in (low, high) if z.min() < h < z.max()]
+    if not max(inside, default=0.0) > 0:
+        return None
+    return Disc(float(place[0, 3]), float(place[1, 3]), float(max(inside)), float(z.max()))
+
+
+def _wedges(profile: Floats) -> Floats:
+    """Return a body of revolution as wedges around its axis, (K, 6, 3)."""
+    turn = 2 * math.pi * np.arange(SIDES + 1) / SIDES
+    ring = np.column_stack([np.cos(turn), np.sin(turn)]) / math.cos(math.pi / SIDES)
+    points = np.empty((len(profile), SIDES + 1, 3))
+    points[:, :, :2], points[:, :, 2] = profile[:, 1, None, None] * ring, profile[:, :1]
+    axis = np.broadcast_to(points * [0.0, 0.0, 1.0], points.shape)
+    corners = [points[:-1, :-1], points[:-1, 1:], points[1:, :-1], points[1:, 1:], axis[:-1, :-1], axis[1:, :-1]]
+    return np.stack(corners, axis=2).reshape(-1, 6, 3)
+
+
+def _extruded(shapes: Sequence[ET.Element]) -> Floats:
+    """Return polylines as upright prisms, (K, 8, 3); what an odd number of them encloses is solid, as in Gazebo."""
+    ends, height = [], max(_sizes(shape, "height")[0] for shape in shapes)
+    for shape in shapes:
+        points = np.array([numbers(point.text, 2, "point") for point in shape.findall("point")])
+        if not 3 <= len(points) <= MAX_POINTS:
+            raise Unsupported(f"a polyline of {len(points)} points")
+        ends.append(np.stack([points, np.roll(points, -1, axis=0)], axis=1))
+    edges = np.concatenate(ends)
+    quads = [edges[:, [0, 1, 0, 1]]]
+    for low, high in itertools.pairwise(np.unique(edges[:, :, 1])):
+        across = edges[(edges[:, :, 1].min(axis=1) <= low) & (edges[:, :, 1].max(axis=1) >= high)]
+        share = (np.array([low, high]) - across[:, :1, 1]) / (across[:, 1:, 1] - across[:, :1, 1])
+        x = across[:, :1, 0] + share * (across[:, 1:, 0] - across[:, :1, 0])
+        x = x[np.argsort(x.sum(axis=1))][: len(x) // 2 * 2].reshape(-1, 4)
+        quads.append(np.stack([x, np.broadcast_to([low, high, low, high], x.shape)], axis=2))
+    flat = np.concatenate(quads)
+    return np.concatenate([np.insert(flat, 2, z, axis=2) for z in (0.0, height)], axis=1)
+
+
+def solid(
+    geometry: ET.Element, place: Floats, band: tuple[float, float], mesh: Callable[[ET.Element], Floats]
+) -> Disc | Floats | str:
+    """Return a <geometry> between two heights: a disc, convex pieces (K, V, 3), or why nothing of it is there.
+
+    `place` (4, 4) includes the scale; `mesh` returns the triangles (K, 3, 3) of a <mesh>.
+    """
+    shape = next(iter(geometry), None)
+    if shape is None or shape.tag == "empty":
+        return "empty"
+    if shape.tag == "plane":
+        normal = place[:3, :3] @ numbers(shape.findtext("normal") or "0 0 1", 3, "normal")
+        if math.hypot(normal[0], normal[1]) > MAX_TILT * abs(normal[2]):
+            raise Unsupported("a plane that is not horizontal")
+        return "flat"
+    if shape.tag in ROUND:
+        profile, stretch = _round(shape)
+        place = place @ np.diag([*stretch, 1.0])
+        if shape.tag == "sphere" and np.ptp(np.linalg.norm(place[:3, :3], axis=0)) < 1e-9:
+            place = np.hstack([np.linalg.norm(place[:3, 0]) * np.eye(4)[:, :3], place[:, 3:]])
+        across, axis = np.linalg.norm(place[:3, :3], axis=0), place[:3, 2]
+        if math.hypot(axis[0], axis[1]) <= MAX_TILT * across[2] and abs(across[0] - across[1]) <= 1e-9:
+            z = place[2, 3] + place[2, 2] * profile[:, 0]
+            return _upright(profile, place, *band) or _where(z, band)
+        pieces = _wedges(profile)
+    elif shape.tag == "box":
+        size = numbers(shape.findtext("size"), 3, "size")
+        if not (size > 0).all():
+            raise Unsupported(f"a box of size {' '.join(f'{v:g}' for v in size)}")
+        pieces = np.array([list(itertools.product((-0.5, 0.5), repeat=3))]) * size
+    elif shape.tag == "polyline":
+        pieces = _extruded(geometry.findall("polyline"))
+    elif shape.tag == "mesh":
+        pieces = mesh(shape)
+    else:
+        raise Unsupported("uneven ground" if shape.tag == "heightmap" else f"shape {shape.tag}")
+    pieces = pieces @ place[:3, :3].T + place[:3, 3]
+    if not (np.abs(pieces) <= MAX_COORDINATE).all():
+        raise Unsupported(f"reaches beyond {MAX_COORDINATE:g} m")
+    z = pieces[:, :, 2]
+    reaching = pieces[(z.max(axis=1) > band[0]) & (z.min(axis=1) < band[1])]
+    return reaching if len(reaching) else _where(z, band)
+
+
+def _where(z: Floats, band: tuple[float, float]) -> str:
+    return "flat" if z.max() <= band[0] else "above"
+
+
+def floor_height(solids: Sequence[Floats]) -> float:
+    """Return the height of the floor [m]: of the top of low plates that cover most of the ground, or 0."""
+    tops, areas = [np.empty(0)], [np.empty(0)]
+    for pieces in solids:
+        z, is_box = pieces[:, :, 2], pieces.shape[1] == 8
+        one, two = (pieces[:, i, :2] - pieces[:, 0, :2] for i in ((4, 2) if is_box else (1, 2)))
+        area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+        areas.append(np.abs(area) if is_box else area.clip(min=0) * (np.ptp(z, axis=1) < BAND[0]) / 2)
+        tops.append(z.max(axis=1))
+    low = ((top := np.concatenate(tops)) > 0) & (top <= HIGHEST_FLOOR)
+    if not low.any():
+        return 0.0
+    covered = np.bincount((top[low] / BAND[0]).round().astype(np.int64), np.concatenate(areas)[low])
+    ends = np.array([[p[:, :, :2].min(axis=(0, 1)), p[:, :, :2].max(axis=(0, 1))] for p in solids])
+    ground = float(np.prod(ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)))
+    return BAND[0] * float(np.flatnonzero(covered > ground / 2).max(initial=0))
+
+
+def cover_pieces(
+    solids: Sequence[Floats], band: tuple[float, float], cell: float | None = None, overhang: float | None = None
+) -> tuple[list[Disc], float]:
+    """Cover convex pieces (K, V, 3) between two heights; return discs, and the largest protrusion beyond the pieces [m].
+
+    By default the side of a cell is 0.02 m, doubled until a few thousand discs suffice, and the overhang beyond blocked
+    cells is one cell.
+    """
+    side = CELL if cell is None else cell
+    tiles = _tiles(solids, side)
+    while cell is None and side < COARSEST and (tiles is None or _rims(tiles, band, side) > MOST_RIMS):
+        side *= 2
+        tiles = _tiles(solids, side)
+    if tiles is None:
+        raise input_error(f"its shapes reach over too many cells of {side:g} m; give larger ones with --resolution")
+    discs: list[Disc] = []
+    reach = 0.0
+    for number, (tile, parts) in enumerate(sorted(tiles.items(), key=lambda item: item[0])):
+        with progress_part(number, len(tiles)):
+            corner, tops = _rasterised(tile, parts, band, side)
+            covered = cover_inside(tops > -np.inf, side, (corner[0], corner[1]), side if overhang is None else overhang)
+            reach = max(reach, covered.overhang)
+            for x, y, radius in covered.discs.tolist():
+                row, col = (y - corner[1]) / side, (x - corner[0]) / side
+                low, high = (math.floor(max(v - radius / side, 0.0)) for v in (row, col)), radius / side
+                rows, cols = (slice(first, math.floor(v + high) + 1) for first, v in zip(low, (row, col), strict=True))
+                discs.append(Disc(tidy(x), tidy(y), radius, float(tops[rows, cols].max())))
+    if len(discs) > MAX_DISCS:
+        problem = (
+            f"needs {len(discs)} cylinders; the limit is {MAX_DISCS}; a larger --resolution or --overhang needs fewer"
+        )
+        raise input_error(problem)
+    return discs, reach + math.sqrt(2.0) * side
+
+
+_Tiles = dict[tuple[int, int], list[Floats]]
+
+
+def _tiles(solids: Sequence[Floats], cell: float) -> _Tiles | None:
+    """Return the pieces in each tile of cells; None if there are too many tiles."""
+    tiles: _Tiles = {}
+    for pieces in solids:
+        ends = np.hstack([pieces[:, :, :2].min(axis=1), pieces[:, :, :2].max(axis=1)])
+        spans, span_of = np.unique(np.floor(ends / (TILE * cell)).astype(np.int64), axis=0, return_inverse=True)
+        for n, (left, below, right, above) in enumerate(spans.tolist()):
+            if len(tiles) + (right - left + 1) * (above - below + 1) > MAX_TILES:
+                return None
+            for tile in itertools.product(range(left, right + 1), range(below, above + 1)):
+                tiles.setdefault(tile, []).append(pieces[span_of.ravel() == n])
+    return tiles
+
+
+def _rims(tiles: _Tiles, band: tuple[float, float], cell: float) -> int:
+    """Return how many blocked cells have a free neighbour to the right or above."""
+    blocked = (_rasterised(tile, parts, band, cell)[1] > -np.inf for tile, parts in tiles.items())
+    return sum(int((cells[1:] != cells[:-1]).sum() + (cells[:, 1:] != cells[:, :-1]).sum()) for cells in blocked)
+
+
+def _rasterised(
+    tile: tuple[int, int], parts: Sequence[Floats], band: tuple[float, float], cell: float
+) -> tuple[list[float], Floats]:
+    """Return a tile's lower left corner [m] and the tops of the pieces over its cells (TILE, TILE); -inf where none are."""
+    from antdrive.worlds.formats._kernels_cover import mark_pieces
+
+    corner, tops = np.array(tile) * (TILE * cell), np.full((TILE, TILE), -np.inf)
+    for pieces in parts:
+        mark_pieces(pieces, *band, corner, cell, SLACK, tops)
+    return corner.tolist(), tops
