@@ -1,7 +1,8 @@
 """Public robots, maps and worlds, imported as their owners would: python -m benchmarks.census FOLDER.
 
 FOLDER holds the repositories of `census.csv` as FOLDER/OWNER+NAME; `python -m benchmarks.census --clone FOLDER | sh` makes them
-with git. No file of theirs is kept here: each has its own licence.
+with git. No file of theirs is kept here: each has its own licence. GAZEBO_MODEL_PATH names FOLDER/osrf+gazebo_models, which
+Gazebo downloads by itself.
 
 Every row runs `antdrive robots import` or `antdrive worlds import` in FOLDER, with the row's arguments, and is judged by what is
 expected of it. A map must cover no free cell, and every blocked cell beside the ground that start or goal is connected to. In a
@@ -14,6 +15,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import math
+import os
 import re
 import shlex
 import subprocess
@@ -138,9 +140,17 @@ def imported(row: Row, arguments: str, folder: Path, written: Path) -> tuple[int
     group = "robots" if row.id.startswith("R") else "worlds"
     words = [f"{row.folder}/{row.path}", *shlex.split(arguments), "--out", str(written)]
     command = [sys.executable, "-m", "antdrive", group, "import", *words]
+    env = os.environ | {"GAZEBO_MODEL_PATH": str(folder / "osrf+gazebo_models")}
     try:
         done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, timeout=LIMIT, stdin=subprocess.DEVNULL, check=False
+            command,
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=LIMIT,
+            stdin=subprocess.DEVNULL,
+            check=False,
+            env=env,
         )
     except subprocess.TimeoutExpired:
         return -1, f"no answer in {LIMIT} s"
@@ -247,7 +257,7 @@ def page(outcomes: Sequence[Outcome]) -> Iterator[str]:
     yield "Files of public repositories, imported with the arguments that their owners would give. None of them is part of"
     yield "antdrive: each has the licence that its package or its repository states. `python -m benchmarks.census --clone FOLDER`"
     yield "prints the git commands that fetch them. A refusal is right if the file has no differential drive or no whole"
-    yield "world, and its line says so."
+    yield "world, and its line says so. Models of Gazebo's own database are those of `osrf/gazebo_models`."
     yield ""
     yield from table(SUMMARY, summary(outcomes))
     for letter, name in KINDS.items():
