@@ -63,6 +63,7 @@ DIFFERENTIAL = {
     ),
     "an infrared sensor": pair()
     + '<gazebo><plugin name="ir_omni_plugin" filename="libgazebo_ros_create_ir_opcode.so"/></gazebo>',
+    "wheels that are only drawn": pair().replace("collision>", "visual>"),
     "virtual joints of the whole": '<link name="odom"/>'
     + joint("theta", "base", "0 0 0", axis="0 0 1", parent="odom")
     + pair(),
@@ -124,6 +125,14 @@ OTHERS = {
         + caster("front", 0.2, 0)
         + "<ros2_control><joint name='front_swivel'><command_interface name='position'/></joint></ros2_control>",
         "front_swivel steer wheels",
+    ),
+    "a front wheel on an unnamed swivel without trail": (
+        pair(-0.2) + steered("front", 0.2, 0, "pin"),
+        "front_pin steer wheels",
+    ),
+    "small front wheels that steer": (
+        pair(-0.2, "rear_") + "".join(steered(s, 0.2, y, "pin").replace("0.1", "0.06") for s, y in FRONT.items()),
+        "left_pin, right_pin steer wheels",
     ),
     "wheels that steer but do not roll": (
         pair(-0.2, "rear_")
@@ -203,8 +212,25 @@ OTHERS = {
         ),
         "it has 4 legs",
     ),
+    "wheels on legs": (
+        four(lambda name, x, y: chain(name, f"{x} {y} 0.4") + wheel(f"{name}w", 0, 0, parent=f"{name}_shank", z=-0.3)),
+        "it has 4 legs",
+    ),
+    "legs without geometry": (
+        "".join(
+            f'<link name="a{y}"/><link name="b{y}"/>'
+            + joint(f"pan{y}", f"a{y}", f"0 {y} 0", "revolute", "0 0 1", more=STEER)
+            + joint(f"tilt{y}", f"b{y}", "0.1 0 0", "revolute", parent=f"a{y}", more=STEER)
+            for y in range(6)
+        ),
+        "it has 6 arms or legs (pan0, pan1, pan2, pan3 and 2 more)",
+    ),
     "legs of continuous joints": (four(lambda name, x, y: chain(name, f"{x} {y} 0.4", "continuous")), "it has 4 legs"),
     "arm": (chain("arm", "0 0 0.6"), "it is an arm (arm_hip, arm_knee in a row)"),
+    "drone of fixed propellers": (
+        four(lambda name, x, y: f'<link name="prop_{name}"/>' + joint(name, f"prop_{name}", f"{x} {y} 0.3", "fixed")),
+        "are propellers",
+    ),
     "drone": (
         four(
             lambda name, x, y: (
@@ -220,9 +246,16 @@ OTHERS = {
         + pair(-0.3, "trailer_", parent="bar", z=0),
         "hitch joins a second body with its own wheels",
     ),
+    "trailer on a limited hitch": (
+        pair()
+        + '<link name="bar"/>'
+        + joint("hitch", "bar", "-0.3 0 0.1", "revolute", "0 0 1", more=STEER)
+        + pair(-0.3, "trailer_", parent="bar", z=0),
+        "hitch joins a second body with its own wheels",
+    ),
     "bicycle": (
         wheel("front_wheel", 0.3, 0) + wheel("rear_wheel", -0.3, 0),
-        "one behind the other (front_wheel_joint, rear_wheel_joint)",
+        "all of its 2 wheels (front_wheel_joint, rear_wheel_joint) are one behind the other, as on a bicycle",
     ),
     "display only": (
         pair().replace("continuous", "fixed"),
@@ -230,7 +263,7 @@ OTHERS = {
     ),
     "tracks": (
         '<link name="left_track"/>' + joint("t", "left_track", "0 0 0", "prismatic"),
-        "it has tracks and no wheels",
+        "it has tracks (t) and no wheels",
     ),
 }
 

@@ -355,7 +355,7 @@ def test_steered_wheels_that_are_not_driven_are_refused_unless_they_swivel_as_ca
     )
     turning = (
         f'<link name="front">{round_}</link><joint name="front_joint" type="{wheel}"><parent link="knuckle"/>'
-        '<child link="front"/><axis xyz="0 1 0"/></joint>'
+        '<child link="front"/><origin xyz="-0.01 0 0"/><axis xyz="0 1 0"/></joint>'
     )
     path = changed(tmp_path, "waffle.urdf", ("<gazebo>", steered + turning + "<gazebo>"))
     if "0.6" in ends:

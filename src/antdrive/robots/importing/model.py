@@ -14,7 +14,7 @@ import re
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -32,7 +32,7 @@ from antdrive.base.ros import ros_package
 from antdrive.base.types import Floats
 from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
 from antdrive.worlds.formats.meshes import read_mesh
-from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml
+from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml, rotation_matrix
 
 STAND_IN = f"{os.sep}missing package "  # start of the path of a missing package
 
@@ -223,6 +223,16 @@ class UrdfJoint:
     # speed limit in <ros2_control> [rad/s]: inf if unlimited, None without a velocity interface
     commanded: float | None = None
 
+    @property
+    def turns(self) -> bool:
+        """Whether it is a hinge."""
+        return self.kind in ("continuous", "revolute")
+
+    @property
+    def called(self) -> str:
+        """Its name and its child link's."""
+        return f"{self.name} {self.child}"
+
 
 @dataclass(frozen=True, eq=False)
 class CollisionPiece:
@@ -269,18 +279,40 @@ class UrdfModel:
         return {joint.child: joint for joint in self.joints.values()}
 
     @cached_property
-    def commanded(self) -> set[str]:
+    def motors(self) -> set[str]:
         """Joints with any command in <ros2_control>."""
-        joints = self.root.findall("ros2_control/joint")
-        return {joint.get("name", "") for joint in joints if joint.find("command_interface") is not None}
+        return {joint.get("name", "") for joint in self.root.findall("ros2_control/joint[command_interface]")}
 
     @cached_property
     def by_link(self) -> Mapping[str, list[CollisionPiece]]:
         """Collision geometry by link."""
+        return self._grouped(self.pieces)
+
+    @cached_property
+    def drawn(self) -> Mapping[str, list[CollisionPiece]]:
+        """Visual geometry by link."""
+        return self._grouped(self.looks)
+
+    def _grouped(self, pieces: Iterable[CollisionPiece]) -> dict[str, list[CollisionPiece]]:
         found: dict[str, list[CollisionPiece]] = {name: [] for name in self.places}
-        for piece in self.pieces:
+        for piece in pieces:
             found[piece.link].append(piece)
         return found
+
+    @cached_property
+    def links(self) -> Mapping[str, ET.Element]:
+        """Elements of the links."""
+        return {link: ET.Element("link") for link in self.places} | {
+            link.get("name", ""): link for link in self.root.findall("link")
+        }
+
+    def points(self, link: str) -> Floats:
+        """Return the points of a link's collision geometry (N, 3), of its drawn one if it has no other."""
+        return np.vstack([np.empty((0, 3)), *(piece.points for piece in self.by_link[link] or self.drawn[link])])
+
+    def bottom(self, link: str) -> float:
+        """Return a link's lowest point [m]; inf without geometry."""
+        return float(self.points(link)[:, 2].min(initial=math.inf))
 
     @cached_property
     def lowest(self) -> CollisionPiece | None:
@@ -480,17 +512,9 @@ def _origin(path: Path, element: ET.Element) -> Floats:
     """Return the frame (4, 4) of an element's <origin>."""
     origin = element.find("origin")
     place = np.eye(4)
-    roll, pitch, yaw = _numbers(path, origin, "rpy", (0.0, 0.0, 0.0))
-    place[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
+    place[:3, :3] = rotation_matrix(*_numbers(path, origin, "rpy", (0.0, 0.0, 0.0)))
     place[:3, 3] = _numbers(path, origin, "xyz", (0.0, 0.0, 0.0))
     return place
-
-
-def _turn(axis: int, angle: float) -> Floats:
-    turn, (a, b) = np.eye(3), ((1, 2), (2, 0), (0, 1))[axis]
-    turn[a, a] = turn[b, b] = math.cos(angle)
-    turn[a, b], turn[b, a] = -math.sin(angle), math.sin(angle)
-    return turn
 
 
 def _joint(path: Path, element: ET.Element) -> UrdfJoint:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,20 +12,21 @@ import numpy as np
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.types import Floats
 from antdrive.robots.importing.drives import (
+    PASSIVE,
+    few,
     free_wheels,
     grips_askew,
     is_free,
-    other_drive,
-    other_wheels,
+    not_driven,
+    refuse_other_drives,
+    refuse_other_wheels,
     turns_as_wheel,
     without_wheels,
 )
-from antdrive.robots.importing.model import CollisionPiece, OtherDriveError, UrdfJoint, UrdfModel
+from antdrive.robots.importing.model import CollisionPiece, UrdfJoint, UrdfModel
 
 SAME = 0.02  # relative tolerance for equal radii and a common axle
 ALIKE = 0.1  # relative tolerance of a skid-steer robot's tracks and radii
-#: Names of wheels that are not driven.
-PASSIVE = re.compile(r"cast[eo]r|passive|idler|support|omni", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +51,13 @@ def driven_wheels(
 ) -> Pair:
     """Return the left and the right driven wheel; raise InputError for robots that steer otherwise."""
     where = str(model.source)
-    if why := other_drive(model):
-        raise OtherDriveError(f"{where}: {why}")
+    refuse_other_drives(model)
     if (left is None) != (right is None):
         raise InputError("--left, --right: give both or none")
     given = [_joint_called(model, name) for name in (left, right) if name is not None]
-    wheels = [_wheel(model, joint, radius) for joint in given or _candidates(model)]
-    if why := other_wheels(model, [wheel.joint for wheel in wheels]):
-        raise OtherDriveError(f"{where}: {why}")
+    joints = given or _candidates(model)
+    refuse_other_wheels(model, joints)
+    wheels = [_wheel(model, joint, radius) for joint in joints]
     pairs = [_given_order(*pair) if given else _in_order(model, *pair) for pair in _axles(wheels)]
     named = {*model.sides[0], *model.sides[1]} | {wheel.joint.name for wheel in wheels if wheel.joint.commanded}
     if not pairs or (left is None and len(named) > 2 and len(wheels) != 2 * len(pairs)):
@@ -86,8 +85,8 @@ def notes_on_wheels(model: UrdfModel, wheels: Pair) -> Iterator[str]:
     if left.span:
         count = len(left.joints)
         yield (
-            f"skid-steer: turns about the middle between its {count} axles ({', '.join(left.joints)} and "
-            f"{', '.join(right.joints)}); --left {left.joint.name} --right {right.joint.name} turns it about the first"
+            f"skid-steer: turns about the middle between its {count} axles ({few(left.joints)} and "
+            f"{few(right.joints)}); --left {left.joint.name} --right {right.joint.name} turns it about the first"
         )
     says = [_says(wheel.joint) for wheel in wheels]
     if left.joint.name in model.sides[1] or (says == ["right", "left"]):
@@ -112,29 +111,28 @@ def _candidates(model: UrdfModel) -> list[UrdfJoint]:
     actuated = commanded or [joint.get("name", "") for joint in model.root.findall("transmission/joint")]
     if len(driven := [joint for joint in free if joint.name in actuated]) >= 2:
         free = driven
-    active = [joint for joint in free if not PASSIVE.search(f"{joint.name} {joint.child}")]
+    active = [joint for joint in free if not PASSIVE.search(joint.called)]
     return active if len(active) >= 2 else free
 
 
 def _axles(wheels: Sequence[DrivenWheel]) -> list[Pair]:
     """Return the outermost two wheels of each axle."""
-    left = list(wheels)
-    pairs: list[Pair] = []
+    pairs, left = [], list(wheels)
     while left:
-        first = left.pop(0)
-        others = [wheel for wheel in left if _on_one_axle(first, wheel)]
-        if others:
-            axle = [first, *others]
-            left = [wheel for wheel in left if not any(wheel is other for other in others)]
-            pairs.append(
-                max(itertools.combinations(axle, 2), key=lambda p: float(np.ptp([w.centre for w in p], 0).max()))
-            )
+        axle = [left[0], *(wheel for wheel in left[1:] if _on_one_axle(left[0], wheel))]
+        left = [wheel for wheel in left if wheel not in axle]
+        if len(axle) > 1:
+            pairs.append(max(itertools.combinations(axle, 2), key=lambda pair: _apart(*pair)))
     return pairs
+
+
+def _apart(a: DrivenWheel, b: DrivenWheel) -> float:
+    return float(np.linalg.norm(a.centre - b.centre))
 
 
 def _alike(pairs: Sequence[Pair]) -> bool:
     """Return whether axles have wheels of one size, as far apart, about parallel axes."""
-    tracks = [float(np.linalg.norm(a.centre - b.centre)) for a, b in pairs]
+    tracks = [_apart(*pair) for pair in pairs]
     radii = [wheel.radius for pair in pairs for wheel in pair]
     axis = pairs[0][0].joint.axis
     level = all(abs(abs(float(axis @ pair[0].joint.axis)) - 1) <= SAME for pair in pairs)
@@ -181,8 +179,8 @@ def _unpaired(model: UrdfModel, wheels: Sequence[DrivenWheel], radius: float | N
                 )
         if len(free_wheels(model)) != 2:
             return f"{names} are not on one axle"
-    free = [_wheel(model, joint, radius) for joint in model.joints.values() if is_free(model, joint)]
-    round_ = [wheel for wheel in free if any(piece.radius for piece in model.by_link[wheel.joint.child])]
+    free = [joint for joint in model.joints.values() if is_free(model, joint)]
+    round_ = [_wheel(model, joint, radius) for joint in free if any(p.radius for p in model.by_link[joint.child])]
     if why := _unlike(wheels) or _unlike(round_):
         return why
     return without_wheels(model, [wheel.joint for wheel in wheels])
@@ -192,20 +190,14 @@ def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:
     match = model.joints.get(name) or next((joint for joint in model.joints.values() if joint.child == name), None)
     if match is not None and turns_as_wheel(match):
         return match
-    some = ", ".join(joint.name for joint in free_wheels(model)) or "none"
-    problem = f"no such joint or link; wheels on the floor: {some}"
-    if match is not None and match.kind == "fixed":
-        problem = "fixed, so the file is for display only; make the joints of its driven wheels continuous"
-    elif match is not None and match.kind == "revolute" and math.isfinite(match.range):
-        problem = f"revolute, with a range of {match.range:.4g} rad; a driven wheel's joint is continuous"
-    elif match is not None:
-        problem = f"does not turn freely about a level axis; wheels on the floor: {some}"
-    raise input_error(str(model.source), f"{name}: {problem}")
+    some = few(joint.name for joint in free_wheels(model)) or "none"
+    problem = "no such joint or link" if match is None else not_driven(match)
+    raise input_error(str(model.source), f"{name}: {problem}; wheels on the floor: {some}")
 
 
 def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWheel:
     own: list[CollisionPiece] = model.by_link[joint.child]
-    looks = [piece for piece in model.looks if piece.link == joint.child]
+    looks = model.drawn[joint.child]
     _, given = model.drive_number("wheel_radius", "wheelRadius")
     _, diameter = model.drive_number("wheel_diameter", "wheelDiameter")
     stated = given or (diameter or 0.0) / 2
@@ -270,7 +262,7 @@ def _unlike(wheels: Sequence[DrivenWheel]) -> str:
 
 def _says(joint: UrdfJoint) -> str:
     """Return the side in a joint's name; empty without one."""
-    sides = set(re.findall(r"left|right", f"{joint.name} {joint.child}".lower()))
+    sides = set(re.findall(r"left|right", joint.called.lower()))
     return sides.pop() if len(sides) == 1 else ""
 
 
