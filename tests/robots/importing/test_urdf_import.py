@@ -136,7 +136,7 @@ def limited(tmp_path, words):
         ('velocity="50"', "max_yaw_rate", 3.14, "assumed: half a turn a second; the velocity limit of joint"),
         ('velocity="400"', "max_speed", 0.5,
          "assumed: the velocity limit of joint wheel_left_joint, 400 rad/s, would be 13.2 m/s, implausible for its size, "
-         "not used; --set max_speed=M/S overrides"),
+         "not used"),
         ('velocity="1"', "max_speed", 0.5, "assumed: the velocity limit of joint wheel_left_joint, 1 rad/s, would be 0.033 m/s"),
         ('velocity="1"', "max_wheel_speed", 18.182, "assumed: 1.2 times the speeds' requirement"),
         ('velocity="inf"', "max_speed", 0.5, "assumed: the file has no limit"),

@@ -12,7 +12,6 @@ import math
 import os
 import re
 import sys
-import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -135,15 +134,16 @@ def _patched(path: Path, packages: Mapping[str, Path], missing: Missing) -> Iter
             vars(xacro)["replace_node"](node, by=None)
             return True
 
-    changes = ((xacro, "open", open_text), (reader, "open", open_text), (finder, "get_path", find))
+    changes = [(xacro, "open", open_text), (reader, "open", open_text), (finder, "get_path", find)]
+    changes.append((xacro, "handle_macro_call", expand_known))
     before = [(module, name, vars(module).get(name, open)) for module, name, _ in changes]
     vars(xacro)["init_stacks"](str(path.resolve()))
     try:
-        for module, name, new in (*changes, (xacro, "handle_macro_call", expand_known)):
+        for module, name, new in changes:
             vars(module)[name] = new
         yield
     finally:
-        for module, name, old in (*before, (xacro, "handle_macro_call", expand_macro)):
+        for module, name, old in before:
             vars(module)[name] = old
 
 
@@ -377,7 +377,7 @@ def _model(path: Path, root: ET.Element, reader: _Shapes, visual: _Shapes, missi
         for piece in visual.drawn(name, places[name], element)
     ]
     masses = {
-        name: _at_least_0(path, f"link {name}", "mass", _number(path, mass, "value", 0.0))
+        name: _positive(path, f"link {name}", "mass", _number(path, mass, "value", 0.0), or_0=True)
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
@@ -456,13 +456,7 @@ def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[st
             raise InputError(f"--arg {next(iter(arguments))}: {path.name} is not a .xacro file and has no arguments")
         return plain, Missing()
     text, missing = expanded(path, arguments, packages)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / f"{path.stem}.urdf"
-        file.write_text(text, encoding="utf-8")
-        try:
-            return parse_xml(file), missing
-        except InputError as error:
-            raise InputError(str(error).replace(str(file), str(path))) from None
+    return parse_xml(path, text), missing
 
 
 def _named(path: Path, element: ET.Element) -> str:
@@ -475,20 +469,16 @@ def _named(path: Path, element: ET.Element) -> str:
 def _numbers(
     path: Path, element: ET.Element | None, key: str, default: tuple[float, ...], most: float = MAX_COORDINATE
 ) -> Floats:
-    text = None if element is None else element.get(key)
-    if text is None:
+    if element is None or (text := element.get(key)) is None:
         return np.array(default)
     try:
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.array([math.nan])
     if len(values) != len(default) or not (np.abs(values) <= most).all():
-        tag, count = (
-            "" if element is None else element.tag,
-            "a number" if len(default) == 1 else f"{len(default)} numbers",
-        )
+        count = "a number" if len(default) == 1 else f"{len(default)} numbers"
         size = "" if math.isinf(most) else f" of at most {most:g}"
-        raise input_error(str(path), f"<{tag} {key}={text!r}>", f"must be {count}{size}")
+        raise input_error(str(path), f"<{element.tag} {key}={text!r}>", f"must be {count}{size}")
     return values
 
 
@@ -496,16 +486,10 @@ def _number(path: Path, element: ET.Element | None, key: str, default: float, mo
     return float(_numbers(path, element, key, (default,), most)[0])
 
 
-def _at_least_0(path: Path, where: str, what: str, value: float) -> float:
-    if value < 0:
-        raise input_error(str(path), where, f"{what} must be at least 0, got {value:g}")
-    return value
-
-
-def _greater_than_0(path: Path, where: str, what: str, value: float) -> float:
-    if not value > 0:
-        raise input_error(str(path), where, f"{what} must be greater than 0, got {value:g}")
-    return value
+def _positive(path: Path, where: str, what: str, value: float, *, or_0: bool = False) -> float:
+    if value > 0 or (or_0 and value == 0):
+        return value
+    raise input_error(str(path), where, f"{what} must be {'at least' if or_0 else 'greater than'} 0, got {value:g}")
 
 
 def _origin(path: Path, element: ET.Element) -> Floats:
@@ -525,7 +509,7 @@ def _joint(path: Path, element: ET.Element) -> UrdfJoint:
     limit = element.find("limit")
     lower, upper = (_number(path, limit, key, 0.0, math.inf) for key in ("lower", "upper"))
     velocity, effort = (
-        _at_least_0(path, f"joint {name}", f"the limit's {key}", _number(path, limit, key, 0.0, math.inf))
+        _positive(path, f"joint {name}", f"the limit's {key}", _number(path, limit, key, 0.0, math.inf), or_0=True)
         for key in ("velocity", "effort")
     )
     stated = element.find("axis")
@@ -580,7 +564,7 @@ class _Shapes:
         radius = None
         if shape.tag == "box":
             size = _numbers(self._path, shape, "size", (0.0, 0.0, 0.0))
-            _greater_than_0(self._path, f"link {link}", "the size of a <box>", float(size.min()))
+            _positive(self._path, f"link {link}", "the size of a <box>", float(size.min()))
             half = size / 2
             points = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
         elif shape.tag == "cylinder":
@@ -612,7 +596,7 @@ class _Shapes:
 
     def _extent(self, link: str, shape: ET.Element, key: str) -> float:
         value = _number(self._path, shape, key, 0.0)
-        return _greater_than_0(self._path, f"link {link}", f"the {key} of a <{shape.tag}>", value)
+        return _positive(self._path, f"link {link}", f"the {key} of a <{shape.tag}>", value)
 
     def _mesh(self, link: str, shape: ET.Element) -> Floats | None:
         """Return a mesh's vertices (N, 3); None if it is missing."""

@@ -26,6 +26,8 @@ from antdrive.robots.importing.drives import (
 from antdrive.robots.importing.model import CollisionPiece, UrdfJoint, UrdfModel
 
 SAME = 0.02  # relative tolerance for equal radii and a common axle
+#: Tags of a drive plugin for the radius of wheels, with their scale.
+RADII = (("wheel_radius", 1.0), ("wheelRadius", 1.0), ("wheel_diameter", 0.5), ("wheelDiameter", 0.5))
 ALIKE = 0.1  # relative tolerance of a skid-steer robot's tracks and radii
 
 
@@ -58,7 +60,7 @@ def driven_wheels(
     joints = given or _candidates(model)
     refuse_other_wheels(model, joints)
     wheels = [_wheel(model, joint, radius) for joint in joints]
-    pairs = [_given_order(*pair) if given else _in_order(model, *pair) for pair in _axles(wheels)]
+    pairs = [_in_order(model, *pair, given=bool(given)) for pair in _axles(wheels)]
     named = {*model.sides[0], *model.sides[1]} | {wheel.joint.name for wheel in wheels if wheel.joint.commanded}
     if not pairs or (left is None and len(named) > 2 and len(wheels) != 2 * len(pairs)):
         raise input_error(where, _unpaired(model, wheels, radius))
@@ -88,8 +90,7 @@ def notes_on_wheels(model: UrdfModel, wheels: Pair) -> Iterator[str]:
             f"skid-steer: turns about the middle between its {count} axles ({few(left.joints)} and "
             f"{few(right.joints)}); --left {left.joint.name} --right {right.joint.name} turns it about the first"
         )
-    says = [_says(wheel.joint) for wheel in wheels]
-    if left.joint.name in model.sides[1] or (says == ["right", "left"]):
+    if _named_left_first(model, right, left):
         yield (
             f"{left.joint.name} is on the left of the file's x axis, although named for the right: "
             f"--left {right.joint.name} --right {left.joint.name} makes the robot face backwards"
@@ -148,13 +149,10 @@ def _skidding(pairs: Sequence[Pair]) -> Pair:
     sides = []
     for side in zip(*pairs, strict=True):
         first, joints = side[0], [wheel.joint for wheel in side]
-        weakest = min((joint.effort for joint in joints if joint.effort), default=None)
-        joint = replace(
-            first.joint,
-            velocity=min((joint.velocity for joint in joints if joint.velocity), default=None),
-            commanded=min((joint.commanded for joint in joints if joint.commanded), default=None),
-            effort=None if weakest is None else weakest * len(joints),
-        )
+        keys = ("velocity", "commanded", "effort")
+        weakest = {key: min(filter(None, (getattr(joint, key) for joint in joints)), default=None) for key in keys}
+        joint = replace(first.joint, **weakest)
+        joint = replace(joint, effort=joint.effort and joint.effort * len(joints))
         middle = np.mean([wheel.centre for wheel in side], axis=0)
         middle += ahead * float(ahead @ ((first.centre + side[-1].centre) / 2 - middle))
         radius = float(np.mean([wheel.radius for wheel in side]))
@@ -196,20 +194,14 @@ def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:
 
 
 def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWheel:
-    own: list[CollisionPiece] = model.by_link[joint.child]
-    looks = model.drawn[joint.child]
-    _, given = model.drive_number("wheel_radius", "wheelRadius")
-    _, diameter = model.drive_number("wheel_diameter", "wheelDiameter")
-    stated = given or (diameter or 0.0) / 2
-    if not own and (radius or stated or not looks):
-        r = radius or stated
-        if not r:
-            raise input_error(
-                str(model.source), f"link {joint.child}", "has no collision geometry; give --wheel-radius METRES"
-            )
-        says = "given" if radius else "the drive plugin"
-        how = f"{says}; width assumed, position from joint {joint.name}"
-        return DrivenWheel(joint, joint.place[:3, 3], r, 0.2 * r, how, given=True)
+    own, looks = model.by_link[joint.child], model.drawn[joint.child]
+    stated = radius or next((scale * r for tag, scale in RADII if (r := model.drive_number(tag)[1])), None)
+    if not own and (stated or not looks):
+        if stated is None:
+            where = f"link {joint.child}"
+            raise input_error(str(model.source), where, "has no collision geometry; give --wheel-radius METRES")
+        how = f"{'given' if radius else 'the drive plugin'}; width assumed, position from joint {joint.name}"
+        return DrivenWheel(joint, joint.place[:3, 3], stated, 0.2 * stated, how, given=True)
     piece = max(own or looks, key=lambda piece: float(np.ptp(piece.points, axis=0).max()))
     middle, r, width = _size(piece, joint)
     how = f"{piece.kind} of link {joint.child}" + ("" if own else ", as drawn")
@@ -266,30 +258,29 @@ def _says(joint: UrdfJoint) -> str:
     return sides.pop() if len(sides) == 1 else ""
 
 
-def _across(a: DrivenWheel, b: DrivenWheel) -> bool:
-    """Return whether the axle is across the root's x axis, so that positions tell left from right."""
+def _in_order(model: UrdfModel, a: DrivenWheel, b: DrivenWheel, *, given: bool) -> Pair:
+    """Return a pair as left and right: along the root's y axis, or by name if the axle has another direction.
+
+    Raises:
+        InputError: if a given pair is swapped by position and not by name, or neither tells left from right.
+    """
     apart = a.centre - b.centre
-    return abs(float(apart[1])) >= 0.5 * float(np.linalg.norm(apart))
-
-
-def _given_order(a: DrivenWheel, b: DrivenWheel) -> Pair:
-    """Return a pair as given; raise InputError if it is swapped by position and not by name."""
-    if _across(a, b) and a.centre[1] < b.centre[1] and (_says(a.joint), _says(b.joint)) != ("left", "right"):
+    across = abs(float(apart[1])) >= 0.5 * float(np.linalg.norm(apart))
+    by_name = next((pair for pair in ((a, b), (b, a)) if _named_left_first(model, *pair)), None)
+    if given and across and apart[1] < 0 and (by_name is None or by_name[0] is b):
         raise InputError(
             f"--left {a.joint.name} is on the right: y is {a.centre[1]:.3g} m, that of {b.joint.name} {b.centre[1]:.3g} m; "
             f"write --left {b.joint.name} --right {a.joint.name}"
         )
-    return a, b
-
-
-def _in_order(model: UrdfModel, a: DrivenWheel, b: DrivenWheel) -> Pair:
-    """Return a pair as left and right: along the root's y axis, or by name if the axle has another direction."""
-    if _across(a, b):
-        return (a, b) if a.centre[1] > b.centre[1] else (b, a)
-    for first, second in ((a, b), (b, a)):
-        if first.joint.name in model.sides[0] or (_says(first.joint), _says(second.joint)) == ("left", "right"):
-            return first, second
+    if given or across:
+        return (a, b) if given or apart[1] > 0 else (b, a)
+    if by_name is not None:
+        return by_name
     raise input_error(
         str(model.source),
         f"it is not clear which of {a.joint.name} and {b.joint.name} is on the left; give --left and --right",
     )
+
+
+def _named_left_first(model: UrdfModel, a: DrivenWheel, b: DrivenWheel) -> bool:
+    return a.joint.name in model.sides[0] or (_says(a.joint), _says(b.joint)) == ("left", "right")
