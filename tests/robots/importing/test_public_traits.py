@@ -145,7 +145,7 @@ OTHERS = {
     ),
     "four steered wheels": (
         four(lambda name, x, y: steered(name, x, y, "unit")),
-        "all its wheels turn about upright axes",
+        "steer all its wheels",
     ),
     "steered wheels without rolling joints": (
         "".join(
@@ -157,7 +157,7 @@ OTHERS = {
     ),
     "a drive below its body": (
         '<link name="roll"/>' + joint("base_roll", "roll", "0 0 0", axis="0 0 1") + pair(parent="roll"),
-        "all its wheels turn about upright axes",
+        "steer all its wheels",
     ),
     "mecanum meshes": (
         four(lambda name, x, y: wheel(name, x, y, mesh="package://a/meshes/mecanum_a.dae")),

@@ -114,19 +114,16 @@ def refuse_other_drives(model: UrdfModel) -> None:
         _refuse(model, f"it has {len(legs)} legs ({few(legs)})")
     held = {joint.name: swivel for joint in wheels if (swivel := _swivel(model, joint)) is not None}
     turning = [joint for joint in wheels if turns_as_wheel(joint)]
-    own = _width([joint for joint in turning if joint.name not in held])
+    rigid = [joint for joint in turning if joint.name not in held]
     for swivel in held.values():
         pulled = [joint for joint in turning if held.get(joint.name) is swivel]
-        if _width(pulled) > TRAILING * own > 0 and not _has_motor(model, swivel):
+        if _width(pulled) > TRAILING * _width(rigid) > 0 and not _has_motor(model, swivel):
             kind = "a trailer, or a steered axle"
             _refuse(model, f"{swivel.name} joins a second body with its own wheels ({_named(pulled)}): {kind}")
-    if len(turning) >= 2 and all(joint.name in held for joint in turning):
-        upright = few(swivel.name for swivel in held.values())
-        why = f"all its wheels turn about upright axes ({upright})"
-        _refuse(model, f"{why}: an omnidirectional drive with steered wheels")
-    steering = [held[joint.name] for joint in wheels if joint.name in held and _steers(model, joint, held[joint.name])]
+    every = len(turning) >= 2 and not rigid
+    steering = [s for joint in wheels if (s := held.get(joint.name)) and (every or _steers(model, joint, s))]
     if steering:
-        _refuse(model, f"{_named(steering)} steer wheels")
+        _refuse(model, f"{_named(steering)} steer {'all its ' if every else ''}wheels")
 
 
 def _has_motor(model: UrdfModel, swivel: UrdfJoint) -> bool:
@@ -164,12 +161,6 @@ def refuse_other_wheels(model: UrdfModel, driven: Sequence[UrdfJoint]) -> None:
         if rollers:
             what = f"its wheels have {len(rollers)} rollers, such as {rollers[0].name}"
             _refuse(model, f"{what}: omni or mecanum wheels")
-
-
-def grips_askew(model: UrdfModel, links: Sequence[str]) -> bool:
-    """Return whether Gazebo is told that links grip along a diagonal, as mecanum wheels and a few others do."""
-    found = [e.findtext(".//fdir1") or "" for e in model.root.findall("gazebo") if e.get("reference") in links]
-    return any(sum(word.strip("-+0.") != "" for word in grip.split()) > 1 for grip in found)
 
 
 def _on(model: UrdfModel, joint: UrdfJoint, wheel: UrdfJoint) -> bool:

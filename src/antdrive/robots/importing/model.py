@@ -14,7 +14,7 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -29,7 +29,6 @@ from antdrive.base.files import open_regular, read_bytes
 from antdrive.base.optional import optional
 from antdrive.base.ros import ros_package
 from antdrive.base.types import Floats
-from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
 from antdrive.worlds.formats.meshes import read_mesh
 from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml, rotation_matrix
 
@@ -69,21 +68,21 @@ class OtherDriveError(InputError):
     """A robot that does not drive differentially, whatever its file lacks."""
 
 
+@dataclass
 class Missing:
     """Packages that were not found, and the macros that are missing with them."""
 
-    def __init__(self) -> None:
-        self.packages: list[str] = []
-        self.macros: list[str] = []  # that expanded to nothing
-        self.included = False  # whether a file of one of them was included
+    packages: list[str] = field(default_factory=list)
+    macros: list[str] = field(default_factory=list)  # that expanded to nothing
+    included: bool = False  # whether a file of one of them was included
 
     @property
     def remedy(self) -> str:
         """How to give them; empty if none is missing."""
+        if not self.packages:
+            return ""
         names = ", ".join(self.packages)
-        return (
-            f"; Package not found: {names}; give its folder with --package {self.packages[0]}=FOLDER" if names else ""
-        )
+        return f"; Package not found: {names}; give its folder with --package {self.packages[0]}=FOLDER"
 
     @contextlib.contextmanager
     def named(self) -> Iterator[None]:
@@ -263,9 +262,8 @@ class UrdfModel:
     drive: dict[str, str]  # values of Gazebo's drive plugins by tag, without repeated tags
     sides: tuple[tuple[str, ...], tuple[str, ...]]  # joints of these plugins' left and right wheels
     missing_meshes: tuple[str, ...]
-    lidars: tuple[UrdfSensor, ...]  # the lidars that Gazebo simulates
     root: ET.Element  # the file, without xacro
-    text: str  # the same
+    links: dict[str, ET.Element]  # of it, by name
     missing: Missing  # packages
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
@@ -298,13 +296,6 @@ class UrdfModel:
         for piece in pieces:
             found[piece.link].append(piece)
         return found
-
-    @cached_property
-    def links(self) -> Mapping[str, ET.Element]:
-        """Elements of the links."""
-        return {link: ET.Element("link") for link in self.places} | {
-            link.get("name", ""): link for link in self.root.findall("link")
-        }
 
     def points(self, link: str) -> Floats:
         """Return the points of a link's collision geometry (N, 3), of its drawn one if it has no other."""
@@ -370,32 +361,18 @@ def _model(path: Path, root: ET.Element, reader: _Shapes, visual: _Shapes, missi
         for piece in reader.piece(name, places[name] @ _origin(path, element), element)
     ]
     solid = {piece.link for piece in pieces if piece.kind != "sphere"}
-    looks = [
-        piece
-        for name in (joint.child for joint in joints.values() if joint.kind != "fixed" and joint.child not in solid)
-        for element in links[name].findall("visual")
-        for piece in visual.drawn(name, places[name], element)
-    ]
+    looks: list[CollisionPiece] = []
+    for name in (joint.child for joint in joints.values() if joint.kind != "fixed" and joint.child not in solid):
+        for element in links[name].findall("visual"):
+            with contextlib.suppress(InputError):
+                looks += visual.piece(name, places[name] @ _origin(path, element), element)
     masses = {
         name: _positive(path, f"link {name}", "mass", _number(path, mass, "value", 0.0), or_0=True)
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
-    return UrdfModel(
-        path,
-        root.get("name", path.stem),
-        joints,
-        places,
-        tuple(pieces),
-        tuple(looks),
-        masses,
-        *_drive(root),
-        tuple(reader.missing_meshes),
-        lidar_sensors(root, places),
-        root,
-        ET.tostring(root, encoding="unicode"),
-        missing,
-    )
+    name, meshes, shapes = root.get("name", path.stem), tuple(reader.missing_meshes), (tuple(pieces), tuple(looks))
+    return UrdfModel(path, name, joints, places, *shapes, masses, *_drive(root), meshes, root, links, missing)
 
 
 def solid_tag(root: ET.Element) -> str:
@@ -588,11 +565,6 @@ class _Shapes:
         else:
             raise input_error(str(self._path), f"link {link}", f"unknown geometry <{shape.tag}>")
         yield CollisionPiece(link, shape.tag, points @ place[:3, :3].T + place[:3, 3], radius)
-
-    def drawn(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
-        """Yield the piece of a <visual> if it can be read."""
-        with contextlib.suppress(InputError):
-            yield from self.piece(link, place @ _origin(self._path, element), element)
 
     def _extent(self, link: str, shape: ET.Element, key: str) -> float:
         value = _number(self._path, shape, key, 0.0)

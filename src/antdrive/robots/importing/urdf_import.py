@@ -23,7 +23,7 @@ from antdrive.robots.importing.drives import few
 from antdrive.robots.importing.hull import footprint_around
 from antdrive.robots.importing.model import CollisionPiece, UrdfModel, read_model, solid_tag
 from antdrive.robots.importing.plausible import below_arms, implausible, plausible_speeds
-from antdrive.robots.importing.sensors import decimal, import_lidar
+from antdrive.robots.importing.sensors import decimal, import_lidar, lidar_sensors
 from antdrive.robots.importing.wheels import RADII, Pair, driven_links, driven_wheels, notes_on_wheels
 from antdrive.robots.outline import Footprint
 from antdrive.robots.robot_file import footprint_to_dict, robot_from_text
@@ -205,7 +205,6 @@ class ImportedRobot:
     # collision geometry below the import's height: each piece's points in the robot's frame, in top view (N, 2) [m]
     pieces: tuple[Floats, ...]
     above: tuple[Floats, ...]  # collision geometry above that height
-    missing_meshes: tuple[str, ...]
     notes: tuple[str, ...]  # assumptions and implausible values, also in the text
 
 
@@ -247,7 +246,7 @@ def import_urdf(
         what = f"{kind} around the {'drawn' if drawn else 'collision'} geometry of {few(names)} and the wheels"
         what += "" if math.isinf(below) else f", below {below:g} m"
         values = _values(model, wheels, outline, floor, given)
-        lidar, seen, unused = import_lidar(model.lidars, frame, floor, outline)
+        lidar, seen, unused = import_lidar(lidar_sensors(model.root, model.places), frame, floor, outline)
         rows = [] if lidar is None else [(f"lidar: {_flow(dataclasses.asdict(lidar))}", seen)]
         text = _text(model, outline, what, values, rows)
         spec = _robot_in(text, path, values)
@@ -271,7 +270,6 @@ def import_urdf(
             text + "".join(f"# note: {note}\n" for note in notes),
             tuple(points),
             tuple(from_above(piece.points, frame) for piece in high),
-            model.missing_meshes,
             tuple(notes),
         )
 

@@ -15,7 +15,6 @@ from antdrive.robots.importing.drives import (
     PASSIVE,
     few,
     free_wheels,
-    grips_askew,
     is_free,
     not_driven,
     refuse_other_drives,
@@ -52,7 +51,6 @@ def driven_wheels(
     model: UrdfModel, left: str | None = None, right: str | None = None, radius: float | None = None
 ) -> Pair:
     """Return the left and the right driven wheel; raise InputError for robots that steer otherwise."""
-    where = str(model.source)
     refuse_other_drives(model)
     if (left is None) != (right is None):
         raise InputError("--left, --right: give both or none")
@@ -63,14 +61,15 @@ def driven_wheels(
     pairs = [_in_order(model, *pair, given=bool(given)) for pair in _axles(wheels)]
     named = {*model.sides[0], *model.sides[1]} | {wheel.joint.name for wheel in wheels if wheel.joint.commanded}
     if not pairs or (left is None and len(named) > 2 and len(wheels) != 2 * len(pairs)):
-        raise input_error(where, _unpaired(model, wheels, radius))
+        raise input_error(str(model.source), _unpaired(model, wheels, radius))
     if len(pairs) == 1:
         return pairs[0]
     if not _alike(pairs):
+        axles = [(left.joint.name, right.joint.name) for left, right in pairs]
         raise input_error(
-            where,
-            f"{len(pairs)} axles with unlike wheels ({_named(pairs)}); name the driven ones with "
-            f"--left {pairs[0][0].joint.name} --right {pairs[0][1].joint.name}",
+            str(model.source),
+            f"{len(pairs)} axles with unlike wheels ({'; '.join(map(' and '.join, axles))}); name the driven ones with "
+            "--left {} --right {}".format(*axles[0]),
         )
     return _skidding(pairs)
 
@@ -97,7 +96,9 @@ def notes_on_wheels(model: UrdfModel, wheels: Pair) -> Iterator[str]:
         )
     elif left.centre[1] < right.centre[1] - abs(left.centre[0] - right.centre[0]):
         yield f"as given, {left.joint.name} is on the left: the robot faces the file's -x axis"
-    if grips_askew(model, [left.joint.child, right.joint.child]):
+    links = (left.joint.child, right.joint.child)
+    grips = [e.findtext(".//fdir1") or "" for e in model.root.findall("gazebo") if e.get("reference") in links]
+    if any(sum(word.strip("-+0.") != "" for word in grip.split()) > 1 for grip in grips):  # along a diagonal
         yield "Gazebo lets its wheels slide aside, as mecanum wheels do: with such wheels it is no differential drive"
     if "width assumed" in left.read_from and not left.given:
         yield f"wheels from the {left.read_from}"
@@ -161,27 +162,19 @@ def _skidding(pairs: Sequence[Pair]) -> Pair:
     return sides[0], sides[1]
 
 
-def _named(pairs: Sequence[Pair]) -> str:
-    return "; ".join(f"{a.joint.name} and {b.joint.name}" for a, b in pairs)
-
-
 def _unpaired(model: UrdfModel, wheels: Sequence[DrivenWheel], radius: float | None) -> str:
     """Explain why no two wheels share an axle."""
-    names = " and ".join(wheel.joint.name for wheel in wheels)
-    if len(wheels) == 2 and not (why := _unlike(wheels)):
-        for wheel in wheels:
-            if not wheel.joint.has_axis:
-                return (
-                    f"{wheel.joint.name} has no <axis>, so it turns about its x axis and not across the robot; "
-                    'give both wheels <axis xyz="0 1 0"/>'
-                )
-        if len(free_wheels(model)) != 2:
-            return f"{names} are not on one axle"
+    joints = [wheel.joint for wheel in wheels]
     free = [joint for joint in model.joints.values() if is_free(model, joint)]
-    round_ = [_wheel(model, joint, radius) for joint in free if any(p.radius for p in model.by_link[joint.child])]
-    if why := _unlike(wheels) or _unlike(round_):
+    round_ = [joint for joint in free if any(piece.radius for piece in model.by_link[joint.child])]
+    if why := _unlike([*wheels, *(_wheel(model, joint, radius) for joint in round_ if joint not in joints)]):
         return why
-    return without_wheels(model, [wheel.joint for wheel in wheels])
+    if len(wheels) == 2 and (bare := next((joint for joint in joints if not joint.has_axis), None)):
+        what = f"{bare.name} has no <axis>, so it turns about its x axis and not across the robot"
+        return f'{what}; give both wheels <axis xyz="0 1 0"/>'
+    if len(wheels) == 2 and len(free_wheels(model)) != 2:
+        return f"{' and '.join(joint.name for joint in joints)} are not on one axle"
+    return without_wheels(model, joints)
 
 
 def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:
