@@ -63,6 +63,12 @@ DIFFERENTIAL = {
     ),
     "an infrared sensor": pair()
     + '<gazebo><plugin name="ir_omni_plugin" filename="libgazebo_ros_create_ir_opcode.so"/></gazebo>',
+    "wheels that are fixed to turning hubs": pair().replace("_wheel", "_hub").replace("collision>", "visual>")
+    + "".join(
+        f'<link name="{side}_tyre"><collision><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.1" length="0.05"/>'
+        "</geometry></collision></link>" + joint(f"{side}_tyre", f"{side}_tyre", "0 0 0", "fixed", parent=f"{side}_hub")
+        for side in ("left", "right")
+    ),
     "wheels that are only drawn": pair().replace("collision>", "visual>"),
     "virtual joints of the whole": '<link name="odom"/>'
     + joint("theta", "base", "0 0 0", axis="0 0 1", parent="odom")
@@ -129,6 +135,14 @@ OTHERS = {
     "a front wheel on an unnamed swivel without trail": (
         pair(-0.2) + steered("front", 0.2, 0, "pin"),
         "front_pin steer wheels",
+    ),
+    "front wheels that steer and collide as spheres": (
+        pair(-0.2, "rear_")
+        + "".join(
+            steered(s, 0.2, y, "pin").replace('cylinder radius="0.1" length="0.04"', 'sphere radius="0.1"')
+            for s, y in FRONT.items()
+        ),
+        "left_pin, right_pin steer wheels",
     ),
     "small front wheels that steer": (
         pair(-0.2, "rear_") + "".join(steered(s, 0.2, y, "pin").replace("0.1", "0.06") for s, y in FRONT.items()),
@@ -288,6 +302,19 @@ def test_another_robot_is_refused_by_what_it_is(tmp_path, kind):
 def test_a_fault_of_the_named_wheels_is_named(tmp_path, change, says):
     with pytest.raises(InputError, match=says):
         imported(tmp_path, BASE, pair().replace(*change), PLUGIN)
+
+
+def test_wheels_without_axes_are_named_though_nothing_calls_them_driven(tmp_path):
+    with pytest.raises(InputError, match=r"left_wheel_joint has no <axis>, .* give both wheels"):
+        imported(tmp_path, BASE, pair().replace('<axis xyz="0 1 0"/>', ""))
+
+
+def test_the_noted_remedy_for_swapped_sides_of_a_plugin_works(tmp_path):
+    swapped = PLUGIN.replace("left_wheel", "a").replace("right_wheel", "b")
+    parts = BASE, wheel("a", 0, -0.22), wheel("b", 0, 0.22), swapped
+    note = next(note for note in imported(tmp_path, *parts).notes if "face backwards" in note)
+    left, right = re.search(r"--left (\w+) --right (\w+)", note).groups()
+    assert any("faces the file's -x axis" in note for note in imported(tmp_path, *parts, left=left, right=right).notes)
 
 
 def test_left_is_left_by_position_and_swapped_names_are_refused_with_the_command(tmp_path):

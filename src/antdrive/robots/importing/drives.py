@@ -22,9 +22,10 @@ STANDING = 0.02  # largest height of a foot above the floor [m]
 TRAIL = 0.05  # least distance of a caster's wheel behind its axis, in diameters
 TRAILING = 0.5  # minimum track of a trailer, in tracks of the robot; those of twin casters are smaller
 
+#: Words in names of robots and plugins.
 PLUGINS = (
     (re.compile(r"mecanum|holonomic|planar_?move|force_based_move", re.IGNORECASE), "an omnidirectional drive"),
-    (re.compile(r"ackermann|tricycle|bicycle", re.IGNORECASE), "steered wheels"),
+    (re.compile(r"ackerman|tricycle|bicycle", re.IGNORECASE), "steered wheels"),
     (re.compile(r"swerve", re.IGNORECASE), "an omnidirectional drive with steered wheels"),
     (re.compile(r"multicopter|quad_?rotor|motor_?model|thruster", re.IGNORECASE), "propellers"),
 )
@@ -44,16 +45,12 @@ def turns_as_wheel(joint: UrdfJoint) -> bool:
     return joint.turns and joint.range > 2 * math.pi and abs(joint.axis[2]) < LEVEL
 
 
-def _named_steering(joint: UrdfJoint) -> bool:
-    return "steer" in joint.called.lower()
-
-
 def stands(model: UrdfModel, joint: UrdfJoint) -> bool:
     """Return whether a joint's child link is a wheel on the floor, not a spinning sensor, a flipper or an arm."""
     points = model.points(joint.child)
     if not len(points) or model.lowest is None:
         return _looks_round(model, joint)
-    height = float(np.ptp(points[:, 2]))
+    height = _height(model, joint)
     if model.bottom(joint.child) > model.lowest.bottom + 0.25 * height:
         return False
     if not turns_as_wheel(joint):
@@ -77,7 +74,7 @@ def _swivel(model: UrdfModel, joint: UrdfJoint) -> UrdfJoint | None:
     A steering joint's name counts, whatever its axis. A joint that turns the whole robot is no part of it.
     """
     for over in model.above(joint.child):
-        upright = over.turns and (abs(over.axis[2]) > SWIVEL or _named_steering(over))
+        upright = over.turns and (abs(over.axis[2]) > SWIVEL or "steer" in over.called.lower())
         if upright and any(over not in model.above(piece.link) for piece in model.pieces):
             return over
     return None
@@ -101,14 +98,14 @@ def _refuse(model: UrdfModel, why: str) -> NoReturn:
 
 def refuse_other_drives(model: UrdfModel) -> None:
     """Raise OtherDriveError if plugins, names, legs or upright joints show that a robot is no differential drive."""
+    called = {f"its name, {model.name} ({model.source.name})": ""}
     for plugin in [*model.root.findall("gazebo/plugin"), *model.root.findall("plugin")]:
         names = " ".join(filter(None, (plugin.get("name"), plugin.get("filename"))))
-        drives = OMNI.search(names) and DRIVES.search(" ".join([OMNI.sub("", names), *(e.tag for e in plugin)]))
-        omni = "an omnidirectional drive" if drives else ""
-        if kind := next((kind for words, kind in PLUGINS if words.search(names)), omni):
-            _refuse(model, f"plugin {names}: {kind}")
-    if re.search("mecanum|holonomic|ackerman", called := f"{model.name} ({model.source.name})", re.IGNORECASE):
-        _refuse(model, f"its name, {called}, says that it has another drive")
+        drives = DRIVES.search(" ".join([OMNI.sub("", names), *(element.tag for element in plugin)]))
+        called[f"plugin {names}"] = "an omnidirectional drive" if OMNI.search(names) and drives else ""
+    for what, omni in called.items():
+        if kind := next((kind for words, kind in PLUGINS if words.search(what)), omni):
+            _refuse(model, f"{what}: {kind}")
     wheels = [joint for joint in model.joints.values() if stands(model, joint)]
     if len(legs := _legs(model, wheels)) >= 2:
         _refuse(model, f"it has {len(legs)} legs ({few(legs)})")
@@ -120,26 +117,32 @@ def refuse_other_drives(model: UrdfModel) -> None:
         if _width(pulled) > TRAILING * _width(rigid) > 0 and not _has_motor(model, swivel):
             kind = "a trailer, or a steered axle"
             _refuse(model, f"{swivel.name} joins a second body with its own wheels ({_named(pulled)}): {kind}")
-    every = len(turning) >= 2 and not rigid
-    steering = [s for joint in wheels if (s := held.get(joint.name)) and (every or _steers(model, joint, s))]
-    if steering:
-        _refuse(model, f"{_named(steering)} steer {'all its ' if every else ''}wheels")
+    if len(turning) >= 2 and not rigid:
+        _refuse(model, f"{_named(held.values())} steer all its wheels")
+    if steering := [swivel for swivel in held.values() if swivel.stated < STEERING or _has_motor(model, swivel)]:
+        _refuse(model, f"{_named(steering)} steer wheels")
+    tallest = max((_height(model, joint) for joint in turning), default=0.0)
+    if steering := [held[joint.name] for joint in turning if _on_spot(model, joint, held.get(joint.name), tallest)]:
+        _refuse(model, f"{_named(steering)} steer wheels (a caster trails its axis, or has caster in its name)")
 
 
 def _has_motor(model: UrdfModel, swivel: UrdfJoint) -> bool:
-    return swivel.name in model.motors or (_named_steering(swivel) and "cast" not in swivel.called.lower())
+    called = swivel.called.lower()
+    return swivel.name in model.motors or ("steer" in called and "cast" not in called)
 
 
-def _steers(model: UrdfModel, wheel: UrdfJoint, swivel: UrdfJoint) -> bool:
-    """Return whether a swivel steers its wheel: casters turn further, have no motor and trail behind theirs."""
-    if swivel.stated < STEERING or _has_motor(model, swivel):
-        return True
-    heights = model.points(wheel.child)[:, 2]
-    size = float(np.ptp(heights)) if len(heights) else 0.0
-    trail = abs(float(_ahead(wheel) @ (wheel.place[:3, 3] - swivel.place[:3, 3])))
-    ball = any(piece.kind == "sphere" for piece in model.by_link[wheel.child])
-    on_spot = turns_as_wheel(wheel) and trail <= TRAIL * size
-    return on_spot and not ball and not PASSIVE.search(f"{wheel.called} {swivel.called}")
+def _on_spot(model: UrdfModel, wheel: UrdfJoint, swivel: UrdfJoint | None, tallest: float) -> bool:
+    """Return whether a swivel turns its wheel on the spot: casters trail behind theirs, but for small balls."""
+    if swivel is None or PASSIVE.search(f"{wheel.called} {swivel.called}"):
+        return False
+    size = _height(model, wheel)
+    ball = size < 0.9 * tallest and any(piece.kind == "sphere" for piece in model.by_link[wheel.child])
+    return not ball and abs(float(_ahead(wheel) @ (wheel.place - swivel.place)[:3, 3])) <= TRAIL * size
+
+
+def _height(model: UrdfModel, joint: UrdfJoint) -> float:
+    heights = model.points(joint.child)[:, 2]
+    return float(np.ptp(heights)) if len(heights) else 0.0
 
 
 def _width(wheels: Sequence[UrdfJoint]) -> float:
@@ -181,9 +184,8 @@ def without_wheels(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> str:
     joints = list(model.joints.values())
     moving = [joint for joint in joints if joint.kind != "fixed"]
     free = [joint for joint in joints if is_free(model, joint)]
-    limited = [joint for joint in moving if joint.kind == "revolute" and joint.range <= 2 * math.pi]
-    limited = [joint for joint in limited if abs(joint.axis[2]) < LEVEL and stands(model, joint)]
-    limited = [joint for joint in limited if not any(_on(model, joint, over) for over in moving)]
+    limited = [joint for joint in moving if joint.kind == "revolute" and not turns_as_wheel(joint)]
+    limited = [j for j in limited if stands(model, j) and not any(_on(model, j, over) for over in moving)]
     rotors = [joint for joint in joints if ROTOR.search(joint.called)]
     upright = [joint for joint in moving if joint.kind == "continuous" and abs(joint.axis[2]) > SWIVEL]
     chains = [chain for _, chain in _chains(model)]
@@ -193,12 +195,15 @@ def without_wheels(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> str:
         what, spots = f"of its {len(wheels)} wheels ({_named(wheels)})", np.array([w.place[:3, 3] for w in wheels])
         if _width(wheels) < 0.2 * float(np.ptp(spots, axis=0).max()):
             return f"all {what} are one behind the other, as on a bicycle; {ONLY_DIFFERENTIAL}"
-        return f"no two {what} share an axle: not a differential drive; if it is one, {fix}"
+        return f"no two {what} share an axle: not a differential drive{f'; if it is one, {fix}' * (len(wheels) > 2)}"
     if rotors:
         return f"{_named(rotors)} are propellers, and it has no wheels on the floor; {ONLY_DIFFERENTIAL}"
     if limited and len(free) < 2:
         return f"{_named(limited)}: {not_driven(min(limited, key=lambda joint: joint.range))}"
-    if low := _too_low(model, [joint for joint in free if joint not in wheels]):
+    hanging = [joint for joint in free if _looks_round(model, joint) and math.isfinite(model.bottom(joint.child))]
+    if len(hanging) >= 2 and model.lowest and model.lowest.link not in {joint.child for joint in hanging}:
+        by = f"{model.bottom(hanging[0].child) - model.lowest.bottom:.4g} m lower than its wheels ({_named(hanging)})"
+        low = f"the collision geometry of link {model.lowest.link} lies {by}"
         return f"{low}, so the wheels are not on the floor; if they drive it, {fix}"
     if len(upright) >= 2 and not free:
         why = f"{_named(upright)} turn about upright axes, and no wheel about a level one"
@@ -212,16 +217,6 @@ def without_wheels(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> str:
     if not moving:
         return "none of its joints moves, so the file is for display; make the joints of its driven wheels continuous"
     return f"has {len(wheels)} free-turning wheels on the floor; a differential drive has two; if it has two, {fix}"
-
-
-def _too_low(model: UrdfModel, hanging: Sequence[UrdfJoint]) -> str:
-    """Return that something rigid is lower than the wheels; empty if it is not so."""
-    bottoms = {joint.name: model.bottom(joint.child) for joint in hanging if _looks_round(model, joint)}
-    if len(bottoms) < 2 or model.lowest is None or model.lowest.link in {joint.child for joint in hanging}:
-        return ""
-    by = {name: z - model.lowest.bottom for name, z in bottoms.items() if math.isfinite(z)}
-    names = ", ".join(f"{name} by {z:.4g} m" for name, z in by.items())
-    return f"the collision geometry of link {model.lowest.link} lies lower than its wheels ({names})" if names else ""
 
 
 def _chains(model: UrdfModel) -> Iterator[tuple[str, list[UrdfJoint]]]:

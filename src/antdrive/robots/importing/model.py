@@ -283,7 +283,7 @@ class UrdfModel:
 
     @cached_property
     def by_link(self) -> Mapping[str, list[CollisionPiece]]:
-        """Collision geometry by link."""
+        """Collision geometry by link, with that of the links fixed to it."""
         return self._grouped(self.pieces)
 
     @cached_property
@@ -292,9 +292,15 @@ class UrdfModel:
         return self._grouped(self.looks)
 
     def _grouped(self, pieces: Iterable[CollisionPiece]) -> dict[str, list[CollisionPiece]]:
+        """Group pieces by link, and also by the moving link that theirs is fixed to."""
         found: dict[str, list[CollisionPiece]] = {name: [] for name in self.places}
+        bodies: dict[str, str] = {}
+        for name in self.places:  # parents first
+            holder = self._holders.get(name)
+            bodies[name] = bodies[holder.parent] if holder is not None and holder.kind == "fixed" else name
         for piece in pieces:
-            found[piece.link].append(piece)
+            for name in {piece.link, bodies[piece.link]}:
+                found[name].append(piece)
         return found
 
     def points(self, link: str) -> Floats:
@@ -385,12 +391,10 @@ def _commanded(path: Path, root: ET.Element, joints: set[str]) -> dict[str, floa
     speeds = {}
     for joint in root.findall("ros2_control/joint"):
         name = _named(path, joint)
-        for interface in joint.findall("command_interface"):
-            if interface.get("name") != "velocity":
-                continue
+        for interface in joint.findall("command_interface[@name='velocity']"):
             if name not in joints:
                 raise input_error(str(path), f"<ros2_control> names joint {name!r}, which does not exist")
-            most = next((param.text for param in interface.findall("param") if param.get("name") == "max"), None)
+            most = interface.findtext("param[@name='max']")
             try:
                 speeds[name] = math.inf if most is None else float(most)
             except ValueError:

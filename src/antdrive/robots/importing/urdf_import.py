@@ -187,13 +187,9 @@ class _Value(NamedTuple):
     how: str
 
     @property
-    def assumed(self) -> bool:
-        return self.how.startswith("assumed")
-
-    @property
     def doubtful(self) -> bool:
         """Whether it is an assumed speed, or the drive plugin contradicts it."""
-        return (self.key == "max_speed" and self.assumed) or self.how.endswith(DOUBT)
+        return (self.key == "max_speed" and self.how.startswith("assumed")) or self.how.endswith(DOUBT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,10 +230,8 @@ def import_urdf(
         high = [piece for piece in solid if piece.bottom - floor > below]
         if not {piece.link for piece in low} - driven_links(model, wheels):
             where = "" if math.isinf(below) else f" below {below:g} m"
-            raise input_error(
-                str(path),
-                f"has no collision geometry{where} other than its wheels, so no footprint; give its body <collision>",
-            )
+            what = f"has no collision geometry{where} other than its wheels, so no footprint"
+            raise input_error(str(path), f"{what}; give its body <collision>")
         points = [from_above(piece.points, frame) for piece in low]
         outline = footprint_around(with_wheels(points, wheels), footprint)
         names = sorted({piece.link for piece in low})
@@ -250,14 +244,13 @@ def import_urdf(
         rows = [] if lidar is None else [(f"lidar: {_flow(dataclasses.asdict(lidar))}", seen)]
         text = _text(model, outline, what, values, rows)
         spec = _robot_in(text, path, values)
+        doubts = [f"{v.key} {v.value:.4g} is {v.how}; --set {v.key}=VALUE overrides" for v in values if v.doubtful]
         notes = [
             *notes_on_wheels(model, wheels),
-            *(
-                f"{value.key} {value.value:.4g} is {value.how}; --set {value.key}=VALUE overrides"
-                for value in values
-                if value.doubtful
+            *doubts,
+            *implausible(
+                spec, wheels[0].span, {*given, *(value.key for value in values if value.how.startswith("assumed"))}
             ),
-            *implausible(spec, wheels[0].span, {*given, *(value.key for value in values if value.assumed)}),
             *below_arms(model, low, frame, floor),
             *unused,
             *(["the file has no collision geometry: the drawn one counts"] if drawn else []),
@@ -335,8 +328,7 @@ def _values(
         "track": (track, apart + _contradiction(model, track, *TRACKS)),
         "mass": _mass(model, (xmax - xmin) * (ymax - ymin) * max(top, 2 * radius)),
     }
-    for key, value in given.items():
-        values[key] = value, "given"
+    values |= {key: (value, "given") for key, value in given.items()}
     add_speeds(model, wheels, outline, values, given)
     add_forces(model, wheels, outline, values, given)
     return [_Value(key, *values[key]) for key in RANGES if key in values]
@@ -374,8 +366,8 @@ def _mass(model: UrdfModel, box: float) -> tuple[float, str]:
 def _text(model: UrdfModel, outline: Footprint, what: str, values: list[_Value], lidar: list[tuple[str, str]]) -> str:
     """Return the text of the robot file."""
     name = "".join(c for c in model.name if c.isprintable()).strip() or model.source.stem
-    rows = [("schema: 1", ""), (f"name: {_quoted(name[:200])}", "read: the robot's name")]
-    rows.append((f"source: {_quoted(f'imported from {model.source.name}')}", ""))
+    name, source = (json.dumps(text, ensure_ascii=False) for text in (name[:200], f"imported from {model.source.name}"))
+    rows = [("schema: 1", ""), (f"name: {name}", "read: the robot's name"), (f"source: {source}", "")]
     foot = footprint_to_dict(outline)
     if outline.box is not None and outline.corners:
         length, width, centre = outline.box
@@ -412,7 +404,3 @@ def _plain(value: object) -> str:
     if isinstance(value, list):
         return f"[{', '.join(map(_plain, value))}]"
     return decimal(value) if isinstance(value, float) else str(value)
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)

@@ -65,7 +65,7 @@ def driven_wheels(
     if len(pairs) == 1:
         return pairs[0]
     if not _alike(pairs):
-        axles = [(left.joint.name, right.joint.name) for left, right in pairs]
+        axles = [(a.joint.name, b.joint.name) for a, b in pairs]
         raise input_error(
             str(model.source),
             f"{len(pairs)} axles with unlike wheels ({'; '.join(map(' and '.join, axles))}); name the driven ones with "
@@ -84,9 +84,8 @@ def notes_on_wheels(model: UrdfModel, wheels: Pair) -> Iterator[str]:
     """Yield what was assumed about the wheels."""
     left, right = wheels
     if left.span:
-        count = len(left.joints)
         yield (
-            f"skid-steer: turns about the middle between its {count} axles ({few(left.joints)} and "
+            f"skid-steer: turns about the middle between its {len(left.joints)} axles ({few(left.joints)} and "
             f"{few(right.joints)}); --left {left.joint.name} --right {right.joint.name} turns it about the first"
         )
     if _named_left_first(model, right, left):
@@ -121,20 +120,20 @@ def _axles(wheels: Sequence[DrivenWheel]) -> list[Pair]:
     """Return the outermost two wheels of each axle."""
     pairs, left = [], list(wheels)
     while left:
-        axle = [left[0], *(wheel for wheel in left[1:] if _on_one_axle(left[0], wheel))]
+        first = left[0]
+        like = [wheel for wheel in left[1:] if abs(first.radius - wheel.radius) <= SAME * first.radius]
+        axle = [first, *(wheel for wheel in like if _turn_about_one_line(first, wheel))]
         left = [wheel for wheel in left if wheel not in axle]
         if len(axle) > 1:
-            pairs.append(max(itertools.combinations(axle, 2), key=lambda pair: _apart(*pair)))
+            pairs.append(
+                max(itertools.combinations(axle, 2), key=lambda pair: np.ptp([w.centre for w in pair], 0).max())
+            )
     return pairs
-
-
-def _apart(a: DrivenWheel, b: DrivenWheel) -> float:
-    return float(np.linalg.norm(a.centre - b.centre))
 
 
 def _alike(pairs: Sequence[Pair]) -> bool:
     """Return whether axles have wheels of one size, as far apart, about parallel axes."""
-    tracks = [_apart(*pair) for pair in pairs]
+    tracks = [float(np.linalg.norm(a.centre - b.centre)) for a, b in pairs]
     radii = [wheel.radius for pair in pairs for wheel in pair]
     axis = pairs[0][0].joint.axis
     level = all(abs(abs(float(axis @ pair[0].joint.axis)) - 1) <= SAME for pair in pairs)
@@ -169,7 +168,7 @@ def _unpaired(model: UrdfModel, wheels: Sequence[DrivenWheel], radius: float | N
     round_ = [joint for joint in free if any(piece.radius for piece in model.by_link[joint.child])]
     if why := _unlike([*wheels, *(_wheel(model, joint, radius) for joint in round_ if joint not in joints)]):
         return why
-    if len(wheels) == 2 and (bare := next((joint for joint in joints if not joint.has_axis), None)):
+    if bare := next((joint for joint in joints or round_ if not joint.has_axis), None):
         what = f"{bare.name} has no <axis>, so it turns about its x axis and not across the robot"
         return f'{what}; give both wheels <axis xyz="0 1 0"/>'
     if len(wheels) == 2 and len(free_wheels(model)) != 2:
@@ -216,11 +215,6 @@ def _size(piece: CollisionPiece, joint: UrdfJoint) -> tuple[Floats, float, float
     return middle, r, float(np.ptp(along))
 
 
-def _on_one_axle(a: DrivenWheel, b: DrivenWheel) -> bool:
-    """Return whether two wheels have equal radii and a common axis."""
-    return _turn_about_one_line(a, b) and abs(a.radius - b.radius) <= SAME * a.radius
-
-
 def _turn_about_one_line(a: DrivenWheel, b: DrivenWheel) -> bool:
     apart = b.centre - a.centre
     away = float(np.linalg.norm(apart))
@@ -245,18 +239,8 @@ def _unlike(wheels: Sequence[DrivenWheel]) -> str:
     return ""
 
 
-def _says(joint: UrdfJoint) -> str:
-    """Return the side in a joint's name; empty without one."""
-    sides = set(re.findall(r"left|right", joint.called.lower()))
-    return sides.pop() if len(sides) == 1 else ""
-
-
 def _in_order(model: UrdfModel, a: DrivenWheel, b: DrivenWheel, *, given: bool) -> Pair:
-    """Return a pair as left and right: along the root's y axis, or by name if the axle has another direction.
-
-    Raises:
-        InputError: if a given pair is swapped by position and not by name, or neither tells left from right.
-    """
+    """Return a pair as left and right: along the root's y axis, or by name if the axle has another direction."""
     apart = a.centre - b.centre
     across = abs(float(apart[1])) >= 0.5 * float(np.linalg.norm(apart))
     by_name = next((pair for pair in ((a, b), (b, a)) if _named_left_first(model, *pair)), None)
@@ -276,4 +260,5 @@ def _in_order(model: UrdfModel, a: DrivenWheel, b: DrivenWheel, *, given: bool) 
 
 
 def _named_left_first(model: UrdfModel, a: DrivenWheel, b: DrivenWheel) -> bool:
-    return a.joint.name in model.sides[0] or (_says(a.joint), _says(b.joint)) == ("left", "right")
+    says = [set(re.findall("left|right", wheel.joint.called.lower())) for wheel in (a, b)]
+    return a.joint.name in model.sides[0] or says == [{"left"}, {"right"}]
