@@ -230,8 +230,9 @@ def _unlike(wheels: Sequence[DrivenWheel]) -> str:
     Heights are ignored: wheels of different radii on one floor have centres at different heights.
     """
     for a, b in itertools.combinations(wheels, 2):
-        level = replace(b, centre=np.array([*b.centre[:2], a.centre[2]]))
-        if _turn_about_one_line(a, level) and abs(a.radius - b.radius) > SAME * a.radius:
+        if abs(a.radius - b.radius) <= SAME * a.radius:
+            continue
+        if _turn_about_one_line(a, replace(b, centre=np.array([*b.centre[:2], a.centre[2]]))):
             radii = " and ".join(f"{wheel.radius:.4g} m (link {wheel.joint.child})" for wheel in (a, b))
             return (
                 f"its wheels have different radii, {radii}; the driven wheels of a differential drive have equal radii"
