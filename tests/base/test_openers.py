@@ -34,7 +34,6 @@ ALLOWED = {
     "cli/commands/robots.py": {"known[name].read_text"},
     "cli/listings.py": {"LISTED.read_text"},
     "cli/testing/session_summary.py": {"open"},
-    "robots/importing/model.py": {"file.write_text"},
     "runs/barn_challenge.py": {"tarfile.open"},
     "runs/campaigns/results.py": {"parquet_library().parquet.read_metadata"},
     "runs/campaigns/store.py": {

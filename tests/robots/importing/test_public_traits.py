@@ -63,6 +63,13 @@ DIFFERENTIAL = {
     ),
     "an infrared sensor": pair()
     + '<gazebo><plugin name="ir_omni_plugin" filename="libgazebo_ros_create_ir_opcode.so"/></gazebo>',
+    "wheels that are fixed to turning hubs": pair().replace("_wheel", "_hub").replace("collision>", "visual>")
+    + "".join(
+        f'<link name="{side}_tyre"><collision><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.1" length="0.05"/>'
+        "</geometry></collision></link>" + joint(f"{side}_tyre", f"{side}_tyre", "0 0 0", "fixed", parent=f"{side}_hub")
+        for side in ("left", "right")
+    ),
+    "wheels that are only drawn": pair().replace("collision>", "visual>"),
     "virtual joints of the whole": '<link name="odom"/>'
     + joint("theta", "base", "0 0 0", axis="0 0 1", parent="odom")
     + pair(),
@@ -125,6 +132,22 @@ OTHERS = {
         + "<ros2_control><joint name='front_swivel'><command_interface name='position'/></joint></ros2_control>",
         "front_swivel steer wheels",
     ),
+    "a front wheel on an unnamed swivel without trail": (
+        pair(-0.2) + steered("front", 0.2, 0, "pin"),
+        "front_pin steer wheels",
+    ),
+    "front wheels that steer and collide as spheres": (
+        pair(-0.2, "rear_")
+        + "".join(
+            steered(s, 0.2, y, "pin").replace('cylinder radius="0.1" length="0.04"', 'sphere radius="0.1"')
+            for s, y in FRONT.items()
+        ),
+        "left_pin, right_pin steer wheels",
+    ),
+    "small front wheels that steer": (
+        pair(-0.2, "rear_") + "".join(steered(s, 0.2, y, "pin").replace("0.1", "0.06") for s, y in FRONT.items()),
+        "left_pin, right_pin steer wheels",
+    ),
     "wheels that steer but do not roll": (
         pair(-0.2, "rear_")
         + pair(0.2, "front_").replace("continuous", "revolute").replace('xyz="0 1 0"/>', 'xyz="0 0 1"/>' + STEER),
@@ -136,7 +159,7 @@ OTHERS = {
     ),
     "four steered wheels": (
         four(lambda name, x, y: steered(name, x, y, "unit")),
-        "all its wheels turn about upright axes",
+        "steer all its wheels",
     ),
     "steered wheels without rolling joints": (
         "".join(
@@ -148,7 +171,7 @@ OTHERS = {
     ),
     "a drive below its body": (
         '<link name="roll"/>' + joint("base_roll", "roll", "0 0 0", axis="0 0 1") + pair(parent="roll"),
-        "all its wheels turn about upright axes",
+        "steer all its wheels",
     ),
     "mecanum meshes": (
         four(lambda name, x, y: wheel(name, x, y, mesh="package://a/meshes/mecanum_a.dae")),
@@ -203,8 +226,25 @@ OTHERS = {
         ),
         "it has 4 legs",
     ),
+    "wheels on legs": (
+        four(lambda name, x, y: chain(name, f"{x} {y} 0.4") + wheel(f"{name}w", 0, 0, parent=f"{name}_shank", z=-0.3)),
+        "it has 4 legs",
+    ),
+    "legs without geometry": (
+        "".join(
+            f'<link name="a{y}"/><link name="b{y}"/>'
+            + joint(f"pan{y}", f"a{y}", f"0 {y} 0", "revolute", "0 0 1", more=STEER)
+            + joint(f"tilt{y}", f"b{y}", "0.1 0 0", "revolute", parent=f"a{y}", more=STEER)
+            for y in range(6)
+        ),
+        "it has 6 arms or legs (pan0, pan1, pan2, pan3 and 2 more)",
+    ),
     "legs of continuous joints": (four(lambda name, x, y: chain(name, f"{x} {y} 0.4", "continuous")), "it has 4 legs"),
     "arm": (chain("arm", "0 0 0.6"), "it is an arm (arm_hip, arm_knee in a row)"),
+    "drone of fixed propellers": (
+        four(lambda name, x, y: f'<link name="prop_{name}"/>' + joint(name, f"prop_{name}", f"{x} {y} 0.3", "fixed")),
+        "are propellers",
+    ),
     "drone": (
         four(
             lambda name, x, y: (
@@ -220,9 +260,16 @@ OTHERS = {
         + pair(-0.3, "trailer_", parent="bar", z=0),
         "hitch joins a second body with its own wheels",
     ),
+    "trailer on a limited hitch": (
+        pair()
+        + '<link name="bar"/>'
+        + joint("hitch", "bar", "-0.3 0 0.1", "revolute", "0 0 1", more=STEER)
+        + pair(-0.3, "trailer_", parent="bar", z=0),
+        "hitch joins a second body with its own wheels",
+    ),
     "bicycle": (
         wheel("front_wheel", 0.3, 0) + wheel("rear_wheel", -0.3, 0),
-        "one behind the other (front_wheel_joint, rear_wheel_joint)",
+        "all of its 2 wheels (front_wheel_joint, rear_wheel_joint) are one behind the other, as on a bicycle",
     ),
     "display only": (
         pair().replace("continuous", "fixed"),
@@ -230,7 +277,7 @@ OTHERS = {
     ),
     "tracks": (
         '<link name="left_track"/>' + joint("t", "left_track", "0 0 0", "prismatic"),
-        "it has tracks and no wheels",
+        "it has tracks (t) and no wheels",
     ),
 }
 
@@ -255,6 +302,19 @@ def test_another_robot_is_refused_by_what_it_is(tmp_path, kind):
 def test_a_fault_of_the_named_wheels_is_named(tmp_path, change, says):
     with pytest.raises(InputError, match=says):
         imported(tmp_path, BASE, pair().replace(*change), PLUGIN)
+
+
+def test_wheels_without_axes_are_named_though_nothing_calls_them_driven(tmp_path):
+    with pytest.raises(InputError, match=r"left_wheel_joint has no <axis>, .* give both wheels"):
+        imported(tmp_path, BASE, pair().replace('<axis xyz="0 1 0"/>', ""))
+
+
+def test_the_noted_remedy_for_swapped_sides_of_a_plugin_works(tmp_path):
+    swapped = PLUGIN.replace("left_wheel", "a").replace("right_wheel", "b")
+    parts = BASE, wheel("a", 0, -0.22), wheel("b", 0, 0.22), swapped
+    note = next(note for note in imported(tmp_path, *parts).notes if "face backwards" in note)
+    left, right = re.search(r"--left (\w+) --right (\w+)", note).groups()
+    assert any("faces the file's -x axis" in note for note in imported(tmp_path, *parts, left=left, right=right).notes)
 
 
 def test_left_is_left_by_position_and_swapped_names_are_refused_with_the_command(tmp_path):

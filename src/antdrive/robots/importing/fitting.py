@@ -14,7 +14,7 @@ from antdrive.base.errors import InputError, input_error
 from antdrive.base.types import Floats
 from antdrive.robots.importing.model import UrdfJoint, UrdfModel, read_model
 from antdrive.robots.importing.urdf_import import floor_under, from_above, planar_frame, solid_pieces, with_wheels
-from antdrive.robots.importing.wheels import DrivenWheel, driven_wheels
+from antdrive.robots.importing.wheels import Pair, driven_wheels
 from antdrive.robots.outline import Footprint
 from antdrive.robots.spec import RobotSpec
 
@@ -66,7 +66,7 @@ def _unfit(path: Path, robot: RobotSpec, why: str) -> InputError:
     return input_error(str(path), f"does not fit the log's robot, {robot.name}: {why}")
 
 
-def _misfit(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], frame: Floats, foot: Footprint) -> float:
+def _misfit(model: UrdfModel, wheels: Pair, frame: Floats, foot: Footprint) -> float:
     """Return by how much the collision geometry, cut at the most suitable height, differs from a footprint [m].
 
     Geometry that lacks meshes may be smaller.

@@ -12,10 +12,9 @@ import math
 import os
 import re
 import sys
-import tempfile
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -30,9 +29,8 @@ from antdrive.base.files import open_regular, read_bytes
 from antdrive.base.optional import optional
 from antdrive.base.ros import ros_package
 from antdrive.base.types import Floats
-from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
 from antdrive.worlds.formats.meshes import read_mesh
-from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml
+from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml, rotation_matrix
 
 STAND_IN = f"{os.sep}missing package "  # start of the path of a missing package
 
@@ -70,21 +68,21 @@ class OtherDriveError(InputError):
     """A robot that does not drive differentially, whatever its file lacks."""
 
 
+@dataclass
 class Missing:
     """Packages that were not found, and the macros that are missing with them."""
 
-    def __init__(self) -> None:
-        self.packages: list[str] = []
-        self.macros: list[str] = []  # that expanded to nothing
-        self.included = False  # whether a file of one of them was included
+    packages: list[str] = field(default_factory=list)
+    macros: list[str] = field(default_factory=list)  # that expanded to nothing
+    included: bool = False  # whether a file of one of them was included
 
     @property
     def remedy(self) -> str:
         """How to give them; empty if none is missing."""
+        if not self.packages:
+            return ""
         names = ", ".join(self.packages)
-        return (
-            f"; Package not found: {names}; give its folder with --package {self.packages[0]}=FOLDER" if names else ""
-        )
+        return f"; Package not found: {names}; give its folder with --package {self.packages[0]}=FOLDER"
 
     @contextlib.contextmanager
     def named(self) -> Iterator[None]:
@@ -135,15 +133,16 @@ def _patched(path: Path, packages: Mapping[str, Path], missing: Missing) -> Iter
             vars(xacro)["replace_node"](node, by=None)
             return True
 
-    changes = ((xacro, "open", open_text), (reader, "open", open_text), (finder, "get_path", find))
+    changes = [(xacro, "open", open_text), (reader, "open", open_text), (finder, "get_path", find)]
+    changes.append((xacro, "handle_macro_call", expand_known))
     before = [(module, name, vars(module).get(name, open)) for module, name, _ in changes]
     vars(xacro)["init_stacks"](str(path.resolve()))
     try:
-        for module, name, new in (*changes, (xacro, "handle_macro_call", expand_known)):
+        for module, name, new in changes:
             vars(module)[name] = new
         yield
     finally:
-        for module, name, old in (*before, (xacro, "handle_macro_call", expand_macro)):
+        for module, name, old in before:
             vars(module)[name] = old
 
 
@@ -223,6 +222,16 @@ class UrdfJoint:
     # speed limit in <ros2_control> [rad/s]: inf if unlimited, None without a velocity interface
     commanded: float | None = None
 
+    @property
+    def turns(self) -> bool:
+        """Whether it is a hinge."""
+        return self.kind in ("continuous", "revolute")
+
+    @property
+    def called(self) -> str:
+        """Its name and its child link's."""
+        return f"{self.name} {self.child}"
+
 
 @dataclass(frozen=True, eq=False)
 class CollisionPiece:
@@ -253,9 +262,8 @@ class UrdfModel:
     drive: dict[str, str]  # values of Gazebo's drive plugins by tag, without repeated tags
     sides: tuple[tuple[str, ...], tuple[str, ...]]  # joints of these plugins' left and right wheels
     missing_meshes: tuple[str, ...]
-    lidars: tuple[UrdfSensor, ...]  # the lidars that Gazebo simulates
     root: ET.Element  # the file, without xacro
-    text: str  # the same
+    links: dict[str, ET.Element]  # of it, by name
     missing: Missing  # packages
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
@@ -269,18 +277,39 @@ class UrdfModel:
         return {joint.child: joint for joint in self.joints.values()}
 
     @cached_property
-    def commanded(self) -> set[str]:
+    def motors(self) -> set[str]:
         """Joints with any command in <ros2_control>."""
-        joints = self.root.findall("ros2_control/joint")
-        return {joint.get("name", "") for joint in joints if joint.find("command_interface") is not None}
+        return {joint.get("name", "") for joint in self.root.findall("ros2_control/joint[command_interface]")}
 
     @cached_property
     def by_link(self) -> Mapping[str, list[CollisionPiece]]:
-        """Collision geometry by link."""
+        """Collision geometry by link, with that of the links fixed to it."""
+        return self._grouped(self.pieces)
+
+    @cached_property
+    def drawn(self) -> Mapping[str, list[CollisionPiece]]:
+        """Visual geometry by link."""
+        return self._grouped(self.looks)
+
+    def _grouped(self, pieces: Iterable[CollisionPiece]) -> dict[str, list[CollisionPiece]]:
+        """Group pieces by link, and also by the moving link that theirs is fixed to."""
         found: dict[str, list[CollisionPiece]] = {name: [] for name in self.places}
-        for piece in self.pieces:
-            found[piece.link].append(piece)
+        bodies: dict[str, str] = {}
+        for name in self.places:  # parents first
+            holder = self._holders.get(name)
+            bodies[name] = bodies[holder.parent] if holder is not None and holder.kind == "fixed" else name
+        for piece in pieces:
+            for name in {piece.link, bodies[piece.link]}:
+                found[name].append(piece)
         return found
+
+    def points(self, link: str) -> Floats:
+        """Return the points of a link's collision geometry (N, 3), of its drawn one if it has no other."""
+        return np.vstack([np.empty((0, 3)), *(piece.points for piece in self.by_link[link] or self.drawn[link])])
+
+    def bottom(self, link: str) -> float:
+        """Return a link's lowest point [m]; inf without geometry."""
+        return float(self.points(link)[:, 2].min(initial=math.inf))
 
     @cached_property
     def lowest(self) -> CollisionPiece | None:
@@ -338,32 +367,18 @@ def _model(path: Path, root: ET.Element, reader: _Shapes, visual: _Shapes, missi
         for piece in reader.piece(name, places[name] @ _origin(path, element), element)
     ]
     solid = {piece.link for piece in pieces if piece.kind != "sphere"}
-    looks = [
-        piece
-        for name in (joint.child for joint in joints.values() if joint.kind != "fixed" and joint.child not in solid)
-        for element in links[name].findall("visual")
-        for piece in visual.drawn(name, places[name], element)
-    ]
+    looks: list[CollisionPiece] = []
+    for name in (joint.child for joint in joints.values() if joint.kind != "fixed" and joint.child not in solid):
+        for element in links[name].findall("visual"):
+            with contextlib.suppress(InputError):
+                looks += visual.piece(name, places[name] @ _origin(path, element), element)
     masses = {
-        name: _at_least_0(path, f"link {name}", "mass", _number(path, mass, "value", 0.0))
+        name: _positive(path, f"link {name}", "mass", _number(path, mass, "value", 0.0), or_0=True)
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
-    return UrdfModel(
-        path,
-        root.get("name", path.stem),
-        joints,
-        places,
-        tuple(pieces),
-        tuple(looks),
-        masses,
-        *_drive(root),
-        tuple(reader.missing_meshes),
-        lidar_sensors(root, places),
-        root,
-        ET.tostring(root, encoding="unicode"),
-        missing,
-    )
+    name, meshes, shapes = root.get("name", path.stem), tuple(reader.missing_meshes), (tuple(pieces), tuple(looks))
+    return UrdfModel(path, name, joints, places, *shapes, masses, *_drive(root), meshes, root, links, missing)
 
 
 def solid_tag(root: ET.Element) -> str:
@@ -376,12 +391,10 @@ def _commanded(path: Path, root: ET.Element, joints: set[str]) -> dict[str, floa
     speeds = {}
     for joint in root.findall("ros2_control/joint"):
         name = _named(path, joint)
-        for interface in joint.findall("command_interface"):
-            if interface.get("name") != "velocity":
-                continue
+        for interface in joint.findall("command_interface[@name='velocity']"):
             if name not in joints:
                 raise input_error(str(path), f"<ros2_control> names joint {name!r}, which does not exist")
-            most = next((param.text for param in interface.findall("param") if param.get("name") == "max"), None)
+            most = interface.findtext("param[@name='max']")
             try:
                 speeds[name] = math.inf if most is None else float(most)
             except ValueError:
@@ -424,13 +437,7 @@ def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[st
             raise InputError(f"--arg {next(iter(arguments))}: {path.name} is not a .xacro file and has no arguments")
         return plain, Missing()
     text, missing = expanded(path, arguments, packages)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / f"{path.stem}.urdf"
-        file.write_text(text, encoding="utf-8")
-        try:
-            return parse_xml(file), missing
-        except InputError as error:
-            raise InputError(str(error).replace(str(file), str(path))) from None
+    return parse_xml(path, text), missing
 
 
 def _named(path: Path, element: ET.Element) -> str:
@@ -443,20 +450,16 @@ def _named(path: Path, element: ET.Element) -> str:
 def _numbers(
     path: Path, element: ET.Element | None, key: str, default: tuple[float, ...], most: float = MAX_COORDINATE
 ) -> Floats:
-    text = None if element is None else element.get(key)
-    if text is None:
+    if element is None or (text := element.get(key)) is None:
         return np.array(default)
     try:
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.array([math.nan])
     if len(values) != len(default) or not (np.abs(values) <= most).all():
-        tag, count = (
-            "" if element is None else element.tag,
-            "a number" if len(default) == 1 else f"{len(default)} numbers",
-        )
+        count = "a number" if len(default) == 1 else f"{len(default)} numbers"
         size = "" if math.isinf(most) else f" of at most {most:g}"
-        raise input_error(str(path), f"<{tag} {key}={text!r}>", f"must be {count}{size}")
+        raise input_error(str(path), f"<{element.tag} {key}={text!r}>", f"must be {count}{size}")
     return values
 
 
@@ -464,33 +467,19 @@ def _number(path: Path, element: ET.Element | None, key: str, default: float, mo
     return float(_numbers(path, element, key, (default,), most)[0])
 
 
-def _at_least_0(path: Path, where: str, what: str, value: float) -> float:
-    if value < 0:
-        raise input_error(str(path), where, f"{what} must be at least 0, got {value:g}")
-    return value
-
-
-def _greater_than_0(path: Path, where: str, what: str, value: float) -> float:
-    if not value > 0:
-        raise input_error(str(path), where, f"{what} must be greater than 0, got {value:g}")
-    return value
+def _positive(path: Path, where: str, what: str, value: float, *, or_0: bool = False) -> float:
+    if value > 0 or (or_0 and value == 0):
+        return value
+    raise input_error(str(path), where, f"{what} must be {'at least' if or_0 else 'greater than'} 0, got {value:g}")
 
 
 def _origin(path: Path, element: ET.Element) -> Floats:
     """Return the frame (4, 4) of an element's <origin>."""
     origin = element.find("origin")
     place = np.eye(4)
-    roll, pitch, yaw = _numbers(path, origin, "rpy", (0.0, 0.0, 0.0))
-    place[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
+    place[:3, :3] = rotation_matrix(*_numbers(path, origin, "rpy", (0.0, 0.0, 0.0)))
     place[:3, 3] = _numbers(path, origin, "xyz", (0.0, 0.0, 0.0))
     return place
-
-
-def _turn(axis: int, angle: float) -> Floats:
-    turn, (a, b) = np.eye(3), ((1, 2), (2, 0), (0, 1))[axis]
-    turn[a, a] = turn[b, b] = math.cos(angle)
-    turn[a, b], turn[b, a] = -math.sin(angle), math.sin(angle)
-    return turn
 
 
 def _joint(path: Path, element: ET.Element) -> UrdfJoint:
@@ -501,7 +490,7 @@ def _joint(path: Path, element: ET.Element) -> UrdfJoint:
     limit = element.find("limit")
     lower, upper = (_number(path, limit, key, 0.0, math.inf) for key in ("lower", "upper"))
     velocity, effort = (
-        _at_least_0(path, f"joint {name}", f"the limit's {key}", _number(path, limit, key, 0.0, math.inf))
+        _positive(path, f"joint {name}", f"the limit's {key}", _number(path, limit, key, 0.0, math.inf), or_0=True)
         for key in ("velocity", "effort")
     )
     stated = element.find("axis")
@@ -556,7 +545,7 @@ class _Shapes:
         radius = None
         if shape.tag == "box":
             size = _numbers(self._path, shape, "size", (0.0, 0.0, 0.0))
-            _greater_than_0(self._path, f"link {link}", "the size of a <box>", float(size.min()))
+            _positive(self._path, f"link {link}", "the size of a <box>", float(size.min()))
             half = size / 2
             points = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
         elif shape.tag == "cylinder":
@@ -581,14 +570,9 @@ class _Shapes:
             raise input_error(str(self._path), f"link {link}", f"unknown geometry <{shape.tag}>")
         yield CollisionPiece(link, shape.tag, points @ place[:3, :3].T + place[:3, 3], radius)
 
-    def drawn(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
-        """Yield the piece of a <visual> if it can be read."""
-        with contextlib.suppress(InputError):
-            yield from self.piece(link, place @ _origin(self._path, element), element)
-
     def _extent(self, link: str, shape: ET.Element, key: str) -> float:
         value = _number(self._path, shape, key, 0.0)
-        return _greater_than_0(self._path, f"link {link}", f"the {key} of a <{shape.tag}>", value)
+        return _positive(self._path, f"link {link}", f"the {key} of a <{shape.tag}>", value)
 
     def _mesh(self, link: str, shape: ET.Element) -> Floats | None:
         """Return a mesh's vertices (N, 3); None if it is missing."""

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Sequence
 import numpy as np
 
 from antdrive.base.types import Floats
-from antdrive.robots.importing.drives import stands, turns_as_wheel
+from antdrive.robots.importing.drives import few, stands, turns_as_wheel
 from antdrive.robots.importing.model import CollisionPiece, UrdfModel
 from antdrive.robots.outline import Footprint
 from antdrive.robots.spec import GRAVITY, RobotSpec
@@ -61,28 +61,23 @@ def _longer_side(foot: Footprint) -> float:
 
 def below_arms(model: UrdfModel, low: Sequence[CollisionPiece], frame: Floats, floor: float) -> Iterator[str]:
     """Yield a remark if links on joints that move neither wheels nor casters widen the footprint."""
-    wheels = [joint for joint in model.joints.values() if stands(model, joint)]
-    carrying = {over.name for wheel in wheels for over in model.above(wheel.child)}
-    still = {name for name, joint in model.joints.items() if joint.kind == "fixed" or turns_as_wheel(joint)}
-    moving = set(model.joints) - still - carrying
-    arm = [piece for piece in low if any(over.name in moving for over in model.above(piece.link))]
-    rest = [piece for piece in low if not any(piece is other for other in arm)]
+    joints = model.joints.values()
+    carrying = {over.name for joint in joints if stands(model, joint) for over in model.above(joint.child)}
+    still = {joint.name for joint in joints if joint.kind == "fixed" or turns_as_wheel(joint)} | carrying
+    arm = [piece for piece in low if any(over.name not in still for over in model.above(piece.link))]
+    rest = [piece for piece in low if piece not in arm]
 
     def reach(pieces: Sequence[CollisionPiece]) -> float:
-        away = (float(np.hypot(*(piece.points[:, :2] - frame[0]).T).max()) for piece in pieces)
-        return max(away, default=0.0)
+        return max((float(np.hypot(*(piece.points[:, :2] - frame[0]).T).max()) for piece in pieces), default=0.0)
 
     wide = [piece for piece in arm if reach([piece]) > WIDER * reach(rest)]
     if not wide or not rest:
         return
-    names = list(dict.fromkeys(piece.link for piece in wide))
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    height = min(piece.bottom for piece in wide) - floor
+    cut = math.floor(100 * (min(piece.bottom for piece in wide) - floor)) / 100 - 0.01
     base = max(piece.bottom for piece in rest) - floor
-    cut = math.floor(100 * height) / 100 - 0.01
     remedy = f"--below {cut:.2f} omits what begins higher" if cut > 0.02 else "edit footprint in the robot file"
     remedy += f", also some of the base, up to {base:.2f} m" if 0.02 < cut < base else ""
     yield (
-        f"links on moving joints ({', '.join(names[:3])}{more}) widen the footprint's radius from {reach(rest):.3g} m to "
-        f"{reach(wide):.3g} m, in the pose with all joints at zero; {remedy}"
+        f"links on moving joints ({few(piece.link for piece in wide)}) widen the footprint's radius from {reach(rest):.3g} m "
+        f"to {reach(wide):.3g} m, in the pose with all joints at zero; {remedy}"
     )

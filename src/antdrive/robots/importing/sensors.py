@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -107,12 +106,6 @@ def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list
         height=round(float(spot[2]) - floor, 5),
     )
     return lidar, [] if rate else [f"rate of {RATE:g} Hz assumed"]
-
-
-def lidar_entry(lidar: Lidar) -> dict[str, str]:
-    """Return a lidar's entry in a robot file."""
-    values = dataclasses.asdict(lidar)
-    return {key: str(value) if key == "beams" else decimal(value) for key, value in values.items()}
 
 
 def decimal(value: float) -> str:

@@ -5,6 +5,8 @@ Each comment also names the limits that its value overrides.
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,9 +23,8 @@ from antdrive.robots.importing.drives import few
 from antdrive.robots.importing.hull import footprint_around
 from antdrive.robots.importing.model import CollisionPiece, UrdfModel, read_model, solid_tag
 from antdrive.robots.importing.plausible import below_arms, implausible, plausible_speeds
-from antdrive.robots.importing.sensors import decimal, import_lidar, lidar_entry
-from antdrive.robots.importing.wheels import DrivenWheel, driven_links, driven_wheels, notes_on_wheels
-from antdrive.robots.lidar import Lidar
+from antdrive.robots.importing.sensors import decimal, import_lidar, lidar_sensors
+from antdrive.robots.importing.wheels import RADII, Pair, driven_links, driven_wheels, notes_on_wheels
 from antdrive.robots.outline import Footprint
 from antdrive.robots.robot_file import footprint_to_dict, robot_from_text
 from antdrive.robots.spec import GRAVITY, RobotSpec, yaw_inertia_of
@@ -34,7 +35,6 @@ DEFAULT_YAW_RATE = 3.14  # default if only the wheels limit it: half a turn a se
 SPARE = 0.9  # used fraction of the motors' capability
 FRICTION = 1.5  # of wheels
 RANGES = ranges_of(RobotSpec)
-NO_LIMIT = "the file has no limit"
 MIN_MOTOR_ACCELERATION = 0.05  # an effort limit for less than this is not a motor's [m/s^2]
 
 Origins = dict[str, tuple[float, str]]  # values of a robot file with their origins
@@ -47,77 +47,64 @@ class _Limit(NamedTuple):
     where: str
 
 
-def add_speeds(
-    model: UrdfModel,
-    wheels: tuple[DrivenWheel, DrivenWheel],
-    outline: Footprint,
-    values: Origins,
-    given: Mapping[str, float],
-) -> None:
+UNLIMITED = _Limit(math.inf, "")
+LIMITS = {  # of joints: text and unit
+    "velocity": ("the velocity limit of joint {}", "rad/s"),
+    "commanded": ("the limit of joint {} in <ros2_control>", "rad/s"),
+    "effort": ("the effort limit of joint {}", "N m"),
+}
+
+
+def add_speeds(model: UrdfModel, wheels: Pair, outline: Footprint, values: Origins, given: Mapping[str, float]) -> None:
     """Add the limits of speed, yaw rate and wheel speed.
 
     A limit of the wheels that gives an implausible speed is a placeholder, not used and named.
     """
     radius, track = values["wheel_radius"][0], values["track"][0]
-    limits = (_lowest(wheels, "velocity", "rad/s"), _lowest_commanded(wheels))
+    limits = [limit for key in ("velocity", "commanded") if (limit := _lowest(wheels, key)).value < math.inf]
     slow, fast = plausible_speeds(outline, RANGES["max_speed"][1])
-    placeholders = [limit for limit in limits if limit.value < math.inf and not slow <= limit.value * radius <= fast]
-    limit = min((limit for limit in limits if limit not in placeholders), default=_Limit(math.inf, ""))
-    turning = seven_digits(limit.value)
-    reach = turning * radius
+    used = [limit for limit in limits if slow <= limit.value * radius <= fast]
+    limit = min(used, default=UNLIMITED)
+    reach = seven_digits(limit.value) * radius
     said = [
-        f"{limit.where}, would be {limit.value * radius:.4g} m/s, implausible for its size, not used"
-        for limit in placeholders
+        f"{other.where}, would be {other.value * radius:.4g} m/s, implausible for its size, not used"
+        for other in limits
+        if other not in used
     ]
-    for key, tags, most, assumed, unit in (
+    for key, tags, most, usual, unit in (
         ("max_speed", ("max_linear_velocity", "max_linear_speed", "linear_velocity_limit"), reach, SPEED, "m/s"),
         ("max_yaw_rate", ("max_angular_velocity", "max_angular_speed"), 2 * reach / track, YAW_RATE, "rad/s"),
     ):
-        tag, stated = model.drive_number(*tags)
         if key in given:
             continue
-        beside = list(said)
+        (tag, stated), beside = model.drive_number(*tags), list(said)
+        plugin = f"<{tag}> of the drive plugin"
         if stated and stated > RANGES[key][1]:  # higher values mean no limit
-            beside.append(f"<{tag}> of the drive plugin, {stated:.7g} {unit}, is {_beyond(key, unit)}")
+            beside.append(f"{plugin}, {stated:.7g} {unit}, is {_beyond(key, unit)}")
             stated = None
         if stated and stated > most:
-            how = f"computed: {limit.where}; <{tag}> of the drive plugin is {stated:g}"
-            values[key] = _five(most), "; ".join([how, *beside])
+            value, how = _five(most), f"computed: {limit.where}; {plugin} is {stated:g}"
         elif stated:
-            values[key] = stated, "; ".join([f"read: <{tag}> of the drive plugin", *beside])
+            value, how = stated, f"read: {plugin}"
         elif most == math.inf:
-            remedy = f"; --set {key}={unit.upper()} overrides" if key == "max_speed" else ""
-            values[key] = assumed, f"assumed: {'; '.join(beside) or NO_LIMIT}{remedy}"
+            value, how = usual, f"assumed: {beside.pop(0) if beside else 'the file has no limit'}"
+        elif key == "max_yaw_rate" and most > DEFAULT_YAW_RATE:
+            value, how = DEFAULT_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
         else:
-            value, how = _of_joints(key, limit, most)
-            values[key] = value, "; ".join([how, *beside])
+            over = " over half the track" if key == "max_yaw_rate" else ""
+            value, how = _five(most), f"computed: {limit.where}, times the wheels' radius{over}"
+        values[key] = value, "; ".join([how, *beside])
     if "max_wheel_speed" in given:
         return
     needs = 1.2 * max(values["max_speed"][0], values["max_yaw_rate"][0] * track / 2) / radius
-    limit = min((limit for limit in limits if limit.value * radius >= slow), default=_Limit(math.inf, ""))
-    turning = seven_digits(limit.value)
-    if turning <= RANGES["max_wheel_speed"][1]:
-        values["max_wheel_speed"] = turning, f"read: {limit.where}"
-    else:
-        instead = f"; {limit.where} is {_beyond('max_wheel_speed', 'rad/s')}" if turning < math.inf else ""
+    limit = min((limit for limit in limits if limit.value * radius >= slow), default=UNLIMITED)
+    values["max_wheel_speed"] = seven_digits(limit.value), f"read: {limit.where}"
+    if limit.value > RANGES["max_wheel_speed"][1]:
+        instead = f"; {limit.where} is {_beyond('max_wheel_speed', 'rad/s')}" if limit != UNLIMITED else ""
         values["max_wheel_speed"] = needs, f"assumed: 1.2 times the speeds' requirement{instead}"
 
 
-def _of_joints(key: str, limit: _Limit, most: float) -> tuple[float, str]:
-    """Return a speed limit derived from the joints' limits, and its origin."""
-    if key == "max_yaw_rate" and most > DEFAULT_YAW_RATE:
-        return DEFAULT_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
-    how = f"computed: {limit.where}, times the wheels' radius"
-    return _five(most), how + (" over half the track" if key == "max_yaw_rate" else "")
-
-
-def add_forces(
-    model: UrdfModel,
-    wheels: tuple[DrivenWheel, DrivenWheel],
-    outline: Footprint,
-    values: Origins,
-    given: Mapping[str, float],
-) -> None:
+def add_forces(model: UrdfModel, wheels: Pair, outline: Footprint, values: Origins, given: Mapping[str, float]) -> None:
     """Add the motors' torque and the accelerations that motors and grip allow."""
     mass, radius, track = (values[key][0] for key in ("mass", "wheel_radius", "track"))
     if "wheel_torque" not in given:
@@ -133,33 +120,30 @@ def add_forces(
         usable, (tag, stated) = SPARE * most, model.drive_number(*tags)
         wanted, how = (stated, f"read: <{tag}> of the drive plugin") if stated else (usual, "assumed")
         less = f"; <{tag}> of the drive plugin is {stated:g}" if stated else ""
-        values[key] = (
-            (wanted, how) if wanted <= usable else (usable, f"computed: 0.9 times the limit of motors and grip{less}")
-        )
+        computed = usable, f"computed: 0.9 times the limit of motors and grip{less}"
+        values[key] = (wanted, how) if wanted <= usable else computed
     if "max_lateral_acceleration" not in given:
         values["max_lateral_acceleration"] = ACCELERATION, "assumed"
 
 
-def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: float, radius: float) -> tuple[float, str]:
+def _torque(model: UrdfModel, wheels: Pair, mass: float, radius: float) -> tuple[float, str]:
     """Return the lowest plausible torque limit; its origin text names all others."""
-    limits = [_lowest(wheels, "effort", "N m")]
     tag, stated = model.drive_number("max_wheel_torque", "wheelTorque", "torque")
-    if stated:
-        limits.append(_Limit(stated, f"<{tag}> of the drive plugin, {stated:.7g} N m"))
+    plugin = _Limit(stated or math.inf, f"<{tag}> of the drive plugin, {stated or 0:.7g} N m")
     weakest, strongest = mass * MIN_MOTOR_ACCELERATION * radius, RANGES["wheel_torque"][1]
-    limits = sorted(limit for limit in limits if limit.value < math.inf)
+    limits = sorted(limit for limit in (_lowest(wheels, "effort"), plugin) if limit.value < math.inf)
     used = next((limit for limit in limits if weakest < limit.value <= strongest), None)
-    beside = ""
+    value, how = 2 * mass * ACCELERATION * radius, f"assumed: 4 times the torque for {ACCELERATION:g} m/s2"
+    if used is not None:
+        value, how = used.value, f"read: {used.where}"
     for limit in limits:
         if limit.value <= weakest:
-            beside += f"; {limit.where} would not move {mass:.4g} kg"
+            how += f"; {limit.where} would not move {mass:.4g} kg"
         elif limit.value > strongest:
-            beside += f"; {limit.where} is {_beyond('wheel_torque', 'N m')}"
+            how += f"; {limit.where} is {_beyond('wheel_torque', 'N m')}"
         elif limit is not used:
-            beside += f"; {limit.where} is more"
-    if used is not None:
-        return used.value, f"read: {used.where}{beside}"
-    return 2 * mass * ACCELERATION * radius, f"assumed: 4 times the torque for {ACCELERATION:g} m/s2{beside}"
+            how += f"; {limit.where} is more"
+    return value, how
 
 
 def _beyond(key: str, unit: str) -> str:
@@ -167,17 +151,12 @@ def _beyond(key: str, unit: str) -> str:
     return f"above the {RANGES[key][1]:g} {unit} limit of robot files, not used"
 
 
-def _lowest(wheels: tuple[DrivenWheel, DrivenWheel], key: str, unit: str) -> _Limit:
+def _lowest(wheels: Pair, key: str) -> _Limit:
     """Return the lower limit of the two joints, with its origin."""
+    what, unit = LIMITS[key]
     value, wheel = min(((getattr(wheel.joint, key) or math.inf, wheel) for wheel in wheels), key=lambda pair: pair[0])
     together = f" together with {', '.join(wheel.joints[1:])}" if key == "effort" and wheel.joints else ""
-    return _Limit(value, f"the {key} limit of joint {wheel.joint.name}{together}, {value:.7g} {unit}")
-
-
-def _lowest_commanded(wheels: tuple[DrivenWheel, DrivenWheel]) -> _Limit:
-    """Return the two joints' lower speed limit in <ros2_control>, with its origin."""
-    value, name = min((wheel.joint.commanded or math.inf, wheel.joint.name) for wheel in wheels)
-    return _Limit(value, f"the limit of joint {name} in <ros2_control>, {value:.7g} rad/s")
+    return _Limit(value, f"{what.format(wheel.joint.name + together)}, {value:.7g} {unit}")
 
 
 def seven_digits(value: float) -> float:
@@ -193,7 +172,6 @@ def _five(value: float) -> float:
 
 
 KINDS = ("auto", "disc", "rectangle", "polygon")
-RADII = (("wheel_radius", 1.0), ("wheelRadius", 1.0), ("wheel_diameter", 0.5), ("wheelDiameter", 0.5))
 TRACKS = (("wheel_separation", 1.0), ("wheelSeparation", 1.0))
 DENSITY = 150.0  # assumed without masses in the file [kg/m^3]
 DIFFERENT = 0.01  # relative difference beyond which a drive plugin contradicts the geometry
@@ -209,13 +187,9 @@ class _Value(NamedTuple):
     how: str
 
     @property
-    def assumed(self) -> bool:
-        return self.how.startswith("assumed")
-
-    @property
     def doubtful(self) -> bool:
         """Whether it is an assumed speed, or the drive plugin contradicts it."""
-        return (self.key == "max_speed" and self.assumed) or self.how.endswith(DOUBT)
+        return (self.key == "max_speed" and self.how.startswith("assumed")) or self.how.endswith(DOUBT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +201,6 @@ class ImportedRobot:
     # collision geometry below the import's height: each piece's points in the robot's frame, in top view (N, 2) [m]
     pieces: tuple[Floats, ...]
     above: tuple[Floats, ...]  # collision geometry above that height
-    missing_meshes: tuple[str, ...]
     notes: tuple[str, ...]  # assumptions and implausible values, also in the text
 
 
@@ -257,10 +230,8 @@ def import_urdf(
         high = [piece for piece in solid if piece.bottom - floor > below]
         if not {piece.link for piece in low} - driven_links(model, wheels):
             where = "" if math.isinf(below) else f" below {below:g} m"
-            raise input_error(
-                str(path),
-                f"has no collision geometry{where} other than its wheels, so no footprint; give its body <collision>",
-            )
+            what = f"has no collision geometry{where} other than its wheels, so no footprint"
+            raise input_error(str(path), f"{what}; give its body <collision>")
         points = [from_above(piece.points, frame) for piece in low]
         outline = footprint_around(with_wheels(points, wheels), footprint)
         names = sorted({piece.link for piece in low})
@@ -269,55 +240,51 @@ def import_urdf(
         what = f"{kind} around the {'drawn' if drawn else 'collision'} geometry of {few(names)} and the wheels"
         what += "" if math.isinf(below) else f", below {below:g} m"
         values = _values(model, wheels, outline, floor, given)
-        lidar, seen, unused = import_lidar(model.lidars, frame, floor, outline)
-        text = _text(model, path, outline, what, values, lidar, seen)
+        lidar, seen, unused = import_lidar(lidar_sensors(model.root, model.places), frame, floor, outline)
+        rows = [] if lidar is None else [(f"lidar: {_flow(dataclasses.asdict(lidar))}", seen)]
+        text = _text(model, outline, what, values, rows)
         spec = _robot_in(text, path, values)
+        doubts = [f"{v.key} {v.value:.4g} is {v.how}; --set {v.key}=VALUE overrides" for v in values if v.doubtful]
         notes = [
             *notes_on_wheels(model, wheels),
-            *(f"{value.key} {value.value:.4g} is {value.how}" for value in values if value.doubtful),
-            *implausible(spec, wheels[0].span, {*given, *(value.key for value in values if value.assumed)}),
+            *doubts,
+            *implausible(
+                spec, wheels[0].span, {*given, *(value.key for value in values if value.how.startswith("assumed"))}
+            ),
             *below_arms(model, low, frame, floor),
             *unused,
             *(["the file has no collision geometry: the drawn one counts"] if drawn else []),
             *model.missing.notes,
             *([f"omitted, because not found: {'; '.join(model.missing_meshes)}"] if model.missing_meshes else []),
         ]
-        notes = ["".join(c if c.isprintable() else "?" for c in note) for note in notes]
+        notes = [_printable(note) for note in notes]
         return ImportedRobot(
             spec,
             text + "".join(f"# note: {note}\n" for note in notes),
             tuple(points),
             tuple(from_above(piece.points, frame) for piece in high),
-            model.missing_meshes,
             tuple(notes),
         )
 
 
-def solid_pieces(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel]) -> list[CollisionPiece]:
+def solid_pieces(model: UrdfModel, wheels: Pair) -> list[CollisionPiece]:
     """Return the collision geometry without driven wheels' spheres, which are wider than the wheels."""
     links = driven_links(model, wheels)
     return [piece for piece in model.pieces if piece.kind != "sphere" or piece.link not in links]
 
 
 def _checked(given: Mapping[str, float]) -> dict[str, float]:
-    keys = list(ranges_of(RobotSpec))
     for key in given:
-        if key not in keys:
-            raise InputError(f"--set {key}: no such number in a robot file; choose from {', '.join(keys)}")
-    for key in (
-        "mass",
-        "wheel_radius",
-        "track",
-        "wheel_torque",
-        "wheel_friction",
-    ):  # limits are computed from these before the file is checked
-        value = given.get(key, 1.0)
-        if not 0 < value < math.inf:
+        if key not in RANGES:
+            raise InputError(f"--set {key}: no such number in a robot file; choose from {', '.join(RANGES)}")
+    # limits are computed from these before the file is checked
+    for key in ("mass", "wheel_radius", "track", "wheel_torque", "wheel_friction"):
+        if not 0 < (value := given.get(key, 1.0)) < math.inf:
             raise InputError(f"{key}: must be a number greater than 0, got {value:g}")
     return dict(given)
 
 
-def planar_frame(wheels: tuple[DrivenWheel, DrivenWheel]) -> Floats:
+def planar_frame(wheels: Pair) -> Floats:
     """Return the robot's planar frame in the root's frame: origin, x and y as rows (3, 2)."""
     left, right = wheels
     across = (left.centre - right.centre)[:2]
@@ -325,7 +292,7 @@ def planar_frame(wheels: tuple[DrivenWheel, DrivenWheel]) -> Floats:
     return np.array([(left.centre[:2] + right.centre[:2]) / 2, (y[1], -y[0]), y])
 
 
-def floor_under(wheels: tuple[DrivenWheel, DrivenWheel]) -> float:
+def floor_under(wheels: Pair) -> float:
     """Return the floor's height in the root's frame [m]."""
     return float(min(wheel.centre[2] - wheel.radius for wheel in wheels))
 
@@ -335,7 +302,7 @@ def from_above(points: Floats, frame: Floats) -> Floats:
     return np.asarray((points[:, :2] - frame[0]) @ frame[1:].T)
 
 
-def with_wheels(points: list[Floats], wheels: tuple[DrivenWheel, DrivenWheel]) -> list[tuple[float, float]]:
+def with_wheels(points: list[Floats], wheels: Pair) -> list[tuple[float, float]]:
     """Return the points of all pieces and the corners of both wheels in top view."""
     half = float(np.linalg.norm(wheels[0].centre - wheels[1].centre)) / 2
     corners = [(float(x), float(y)) for piece in points for x, y in piece]
@@ -346,11 +313,7 @@ def with_wheels(points: list[Floats], wheels: tuple[DrivenWheel, DrivenWheel]) -
 
 
 def _values(
-    model: UrdfModel,
-    wheels: tuple[DrivenWheel, DrivenWheel],
-    outline: Footprint,
-    floor: float,
-    given: Mapping[str, float],
+    model: UrdfModel, wheels: Pair, outline: Footprint, floor: float, given: Mapping[str, float]
 ) -> list[_Value]:
     left, right = wheels
     track = seven_digits(float(np.linalg.norm(left.centre - right.centre)))
@@ -365,11 +328,10 @@ def _values(
         "track": (track, apart + _contradiction(model, track, *TRACKS)),
         "mass": _mass(model, (xmax - xmin) * (ymax - ymin) * max(top, 2 * radius)),
     }
-    for key, value in given.items():
-        values[key] = value, "given"
+    values |= {key: (value, "given") for key, value in given.items()}
     add_speeds(model, wheels, outline, values, given)
     add_forces(model, wheels, outline, values, given)
-    return [_Value(key, *values[key]) for key in ranges_of(RobotSpec) if key in values]
+    return [_Value(key, *values[key]) for key in RANGES if key in values]
 
 
 def _robot_in(text: str, path: Path, values: list[_Value]) -> RobotSpec:
@@ -401,37 +363,25 @@ def _mass(model: UrdfModel, box: float) -> tuple[float, str]:
     return sum(model.masses.values()), f"computed: sum of the masses of {few(heavy)}{without}"
 
 
-def _text(
-    model: UrdfModel,
-    path: Path,
-    outline: Footprint,
-    what: str,
-    values: list[_Value],
-    lidar: Lidar | None,
-    seen: str,
-) -> str:
+def _text(model: UrdfModel, outline: Footprint, what: str, values: list[_Value], lidar: list[tuple[str, str]]) -> str:
     """Return the text of the robot file."""
-    name = "".join(c for c in model.name if c.isprintable()).strip() or path.stem
-    rows = [("schema: 1", ""), (f"name: {_quoted(name[:200])}", "read: the robot's name")]
-    rows.append((f"source: {_quoted(f'imported from {path.name}')}", ""))
+    name = "".join(c for c in model.name if c.isprintable()).strip() or model.source.stem
+    name, source = (json.dumps(text, ensure_ascii=False) for text in (name[:200], f"imported from {model.source.name}"))
+    rows = [("schema: 1", ""), (f"name: {name}", "read: the robot's name"), (f"source: {source}", "")]
     foot = footprint_to_dict(outline)
     if outline.box is not None and outline.corners:
         length, width, centre = outline.box
         foot = {"length": round(length, 9), "width": round(width, 9), "centre": [round(v, 9) for v in centre]}
     rows.append((f"footprint: {_flow(foot)}", f"computed: {what}"))
     rows += [(f"{value.key}: {_rounded(value)}", value.how) for value in values]
-    if lidar is not None:
-        rows.append((f"lidar: {_flow(lidar_entry(lidar))}", seen))
+    rows += lidar
     rows.append((f"noise: {NOISE}", "assumed: as in the catalogue; measure the robot's own"))
     lines = []
     for text, how in rows:
-        comment = "".join(c if c.isprintable() else "?" for c in how)
-        if not comment:
-            lines.append(text)
-        elif len(text) > 40:
-            lines += [f"# {comment}", text]
+        if how and len(text) > 40:
+            lines += [f"# {_printable(how)}", text]
         else:
-            lines.append(f"{text:30}  # {comment}")
+            lines.append(f"{text:30}  # {_printable(how)}" if how else text)
     return "\n".join(lines) + "\n"
 
 
@@ -439,6 +389,10 @@ def _rounded(value: _Value) -> str:
     """Format a value in seven digits, without exponent."""
     digits = value.value if value.how == "given" else seven_digits(value.value)
     return f"{digits:.10f}".rstrip("0").rstrip(".") if digits < 1e9 else repr(digits)
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in text)
 
 
 def _flow(entry: Mapping[str, object]) -> str:
@@ -450,8 +404,3 @@ def _plain(value: object) -> str:
     if isinstance(value, list):
         return f"[{', '.join(map(_plain, value))}]"
     return decimal(value) if isinstance(value, float) else str(value)
-
-
-def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'

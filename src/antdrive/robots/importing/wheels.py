@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,20 +12,22 @@ import numpy as np
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.types import Floats
 from antdrive.robots.importing.drives import (
+    PASSIVE,
+    few,
     free_wheels,
-    grips_askew,
     is_free,
-    other_drive,
-    other_wheels,
+    not_driven,
+    refuse_other_drives,
+    refuse_other_wheels,
     turns_as_wheel,
     without_wheels,
 )
-from antdrive.robots.importing.model import CollisionPiece, OtherDriveError, UrdfJoint, UrdfModel
+from antdrive.robots.importing.model import CollisionPiece, UrdfJoint, UrdfModel
 
 SAME = 0.02  # relative tolerance for equal radii and a common axle
+#: Tags of a drive plugin for the radius of wheels, with their scale.
+RADII = (("wheel_radius", 1.0), ("wheelRadius", 1.0), ("wheel_diameter", 0.5), ("wheelDiameter", 0.5))
 ALIKE = 0.1  # relative tolerance of a skid-steer robot's tracks and radii
-#: Names of wheels that are not driven.
-PASSIVE = re.compile(r"cast[eo]r|passive|idler|support|omni", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,26 +51,25 @@ def driven_wheels(
     model: UrdfModel, left: str | None = None, right: str | None = None, radius: float | None = None
 ) -> Pair:
     """Return the left and the right driven wheel; raise InputError for robots that steer otherwise."""
-    where = str(model.source)
-    if why := other_drive(model):
-        raise OtherDriveError(f"{where}: {why}")
+    refuse_other_drives(model)
     if (left is None) != (right is None):
         raise InputError("--left, --right: give both or none")
     given = [_joint_called(model, name) for name in (left, right) if name is not None]
-    wheels = [_wheel(model, joint, radius) for joint in given or _candidates(model)]
-    if why := other_wheels(model, [wheel.joint for wheel in wheels]):
-        raise OtherDriveError(f"{where}: {why}")
-    pairs = [_given_order(*pair) if given else _in_order(model, *pair) for pair in _axles(wheels)]
+    joints = given or _candidates(model)
+    refuse_other_wheels(model, joints)
+    wheels = [_wheel(model, joint, radius) for joint in joints]
+    pairs = [_in_order(model, *pair, given=bool(given)) for pair in _axles(wheels)]
     named = {*model.sides[0], *model.sides[1]} | {wheel.joint.name for wheel in wheels if wheel.joint.commanded}
     if not pairs or (left is None and len(named) > 2 and len(wheels) != 2 * len(pairs)):
-        raise input_error(where, _unpaired(model, wheels, radius))
+        raise input_error(str(model.source), _unpaired(model, wheels, radius))
     if len(pairs) == 1:
         return pairs[0]
     if not _alike(pairs):
+        axles = [(a.joint.name, b.joint.name) for a, b in pairs]
         raise input_error(
-            where,
-            f"{len(pairs)} axles with unlike wheels ({_named(pairs)}); name the driven ones with "
-            f"--left {pairs[0][0].joint.name} --right {pairs[0][1].joint.name}",
+            str(model.source),
+            f"{len(pairs)} axles with unlike wheels ({'; '.join(map(' and '.join, axles))}); name the driven ones with "
+            "--left {} --right {}".format(*axles[0]),
         )
     return _skidding(pairs)
 
@@ -84,20 +84,20 @@ def notes_on_wheels(model: UrdfModel, wheels: Pair) -> Iterator[str]:
     """Yield what was assumed about the wheels."""
     left, right = wheels
     if left.span:
-        count = len(left.joints)
         yield (
-            f"skid-steer: turns about the middle between its {count} axles ({', '.join(left.joints)} and "
-            f"{', '.join(right.joints)}); --left {left.joint.name} --right {right.joint.name} turns it about the first"
+            f"skid-steer: turns about the middle between its {len(left.joints)} axles ({few(left.joints)} and "
+            f"{few(right.joints)}); --left {left.joint.name} --right {right.joint.name} turns it about the first"
         )
-    says = [_says(wheel.joint) for wheel in wheels]
-    if left.joint.name in model.sides[1] or (says == ["right", "left"]):
+    if _named_left_first(model, right, left):
         yield (
             f"{left.joint.name} is on the left of the file's x axis, although named for the right: "
             f"--left {right.joint.name} --right {left.joint.name} makes the robot face backwards"
         )
     elif left.centre[1] < right.centre[1] - abs(left.centre[0] - right.centre[0]):
         yield f"as given, {left.joint.name} is on the left: the robot faces the file's -x axis"
-    if grips_askew(model, [left.joint.child, right.joint.child]):
+    links = (left.joint.child, right.joint.child)
+    grips = [e.findtext(".//fdir1") or "" for e in model.root.findall("gazebo") if e.get("reference") in links]
+    if any(sum(word.strip("-+0.") != "" for word in grip.split()) > 1 for grip in grips):  # along a diagonal
         yield "Gazebo lets its wheels slide aside, as mecanum wheels do: with such wheels it is no differential drive"
     if "width assumed" in left.read_from and not left.given:
         yield f"wheels from the {left.read_from}"
@@ -112,22 +112,21 @@ def _candidates(model: UrdfModel) -> list[UrdfJoint]:
     actuated = commanded or [joint.get("name", "") for joint in model.root.findall("transmission/joint")]
     if len(driven := [joint for joint in free if joint.name in actuated]) >= 2:
         free = driven
-    active = [joint for joint in free if not PASSIVE.search(f"{joint.name} {joint.child}")]
+    active = [joint for joint in free if not PASSIVE.search(joint.called)]
     return active if len(active) >= 2 else free
 
 
 def _axles(wheels: Sequence[DrivenWheel]) -> list[Pair]:
     """Return the outermost two wheels of each axle."""
-    left = list(wheels)
-    pairs: list[Pair] = []
+    pairs, left = [], list(wheels)
     while left:
-        first = left.pop(0)
-        others = [wheel for wheel in left if _on_one_axle(first, wheel)]
-        if others:
-            axle = [first, *others]
-            left = [wheel for wheel in left if not any(wheel is other for other in others)]
+        first = left[0]
+        like = [wheel for wheel in left[1:] if abs(first.radius - wheel.radius) <= SAME * first.radius]
+        axle = [first, *(wheel for wheel in like if _turn_about_one_line(first, wheel))]
+        left = [wheel for wheel in left if wheel not in axle]
+        if len(axle) > 1:
             pairs.append(
-                max(itertools.combinations(axle, 2), key=lambda p: float(np.ptp([w.centre for w in p], 0).max()))
+                max(itertools.combinations(axle, 2), key=lambda pair: np.ptp([w.centre for w in pair], 0).max())
             )
     return pairs
 
@@ -150,13 +149,10 @@ def _skidding(pairs: Sequence[Pair]) -> Pair:
     sides = []
     for side in zip(*pairs, strict=True):
         first, joints = side[0], [wheel.joint for wheel in side]
-        weakest = min((joint.effort for joint in joints if joint.effort), default=None)
-        joint = replace(
-            first.joint,
-            velocity=min((joint.velocity for joint in joints if joint.velocity), default=None),
-            commanded=min((joint.commanded for joint in joints if joint.commanded), default=None),
-            effort=None if weakest is None else weakest * len(joints),
-        )
+        keys = ("velocity", "commanded", "effort")
+        weakest = {key: min(filter(None, (getattr(joint, key) for joint in joints)), default=None) for key in keys}
+        joint = replace(first.joint, **weakest)
+        joint = replace(joint, effort=joint.effort and joint.effort * len(joints))
         middle = np.mean([wheel.centre for wheel in side], axis=0)
         middle += ahead * float(ahead @ ((first.centre + side[-1].centre) / 2 - middle))
         radius = float(np.mean([wheel.radius for wheel in side]))
@@ -165,59 +161,39 @@ def _skidding(pairs: Sequence[Pair]) -> Pair:
     return sides[0], sides[1]
 
 
-def _named(pairs: Sequence[Pair]) -> str:
-    return "; ".join(f"{a.joint.name} and {b.joint.name}" for a, b in pairs)
-
-
 def _unpaired(model: UrdfModel, wheels: Sequence[DrivenWheel], radius: float | None) -> str:
     """Explain why no two wheels share an axle."""
-    names = " and ".join(wheel.joint.name for wheel in wheels)
-    if len(wheels) == 2 and not (why := _unlike(wheels)):
-        for wheel in wheels:
-            if not wheel.joint.has_axis:
-                return (
-                    f"{wheel.joint.name} has no <axis>, so it turns about its x axis and not across the robot; "
-                    'give both wheels <axis xyz="0 1 0"/>'
-                )
-        if len(free_wheels(model)) != 2:
-            return f"{names} are not on one axle"
-    free = [_wheel(model, joint, radius) for joint in model.joints.values() if is_free(model, joint)]
-    round_ = [wheel for wheel in free if any(piece.radius for piece in model.by_link[wheel.joint.child])]
-    if why := _unlike(wheels) or _unlike(round_):
+    joints = [wheel.joint for wheel in wheels]
+    free = [joint for joint in model.joints.values() if is_free(model, joint)]
+    round_ = [joint for joint in free if any(piece.radius for piece in model.by_link[joint.child])]
+    if why := _unlike([*wheels, *(_wheel(model, joint, radius) for joint in round_ if joint not in joints)]):
         return why
-    return without_wheels(model, [wheel.joint for wheel in wheels])
+    if bare := next((joint for joint in joints or round_ if not joint.has_axis), None):
+        what = f"{bare.name} has no <axis>, so it turns about its x axis and not across the robot"
+        return f'{what}; give both wheels <axis xyz="0 1 0"/>'
+    if len(wheels) == 2 and len(free_wheels(model)) != 2:
+        return f"{' and '.join(joint.name for joint in joints)} are not on one axle"
+    return without_wheels(model, joints)
 
 
 def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:
     match = model.joints.get(name) or next((joint for joint in model.joints.values() if joint.child == name), None)
     if match is not None and turns_as_wheel(match):
         return match
-    some = ", ".join(joint.name for joint in free_wheels(model)) or "none"
-    problem = f"no such joint or link; wheels on the floor: {some}"
-    if match is not None and match.kind == "fixed":
-        problem = "fixed, so the file is for display only; make the joints of its driven wheels continuous"
-    elif match is not None and match.kind == "revolute" and math.isfinite(match.range):
-        problem = f"revolute, with a range of {match.range:.4g} rad; a driven wheel's joint is continuous"
-    elif match is not None:
-        problem = f"does not turn freely about a level axis; wheels on the floor: {some}"
-    raise input_error(str(model.source), f"{name}: {problem}")
+    some = few(joint.name for joint in free_wheels(model)) or "none"
+    problem = "no such joint or link" if match is None else not_driven(match)
+    raise input_error(str(model.source), f"{name}: {problem}; wheels on the floor: {some}")
 
 
 def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWheel:
-    own: list[CollisionPiece] = model.by_link[joint.child]
-    looks = [piece for piece in model.looks if piece.link == joint.child]
-    _, given = model.drive_number("wheel_radius", "wheelRadius")
-    _, diameter = model.drive_number("wheel_diameter", "wheelDiameter")
-    stated = given or (diameter or 0.0) / 2
-    if not own and (radius or stated or not looks):
-        r = radius or stated
-        if not r:
-            raise input_error(
-                str(model.source), f"link {joint.child}", "has no collision geometry; give --wheel-radius METRES"
-            )
-        says = "given" if radius else "the drive plugin"
-        how = f"{says}; width assumed, position from joint {joint.name}"
-        return DrivenWheel(joint, joint.place[:3, 3], r, 0.2 * r, how, given=True)
+    own, looks = model.by_link[joint.child], model.drawn[joint.child]
+    stated = radius or next((scale * r for tag, scale in RADII if (r := model.drive_number(tag)[1])), None)
+    if not own and (stated or not looks):
+        if stated is None:
+            where = f"link {joint.child}"
+            raise input_error(str(model.source), where, "has no collision geometry; give --wheel-radius METRES")
+        how = f"{'given' if radius else 'the drive plugin'}; width assumed, position from joint {joint.name}"
+        return DrivenWheel(joint, joint.place[:3, 3], stated, 0.2 * stated, how, given=True)
     piece = max(own or looks, key=lambda piece: float(np.ptp(piece.points, axis=0).max()))
     middle, r, width = _size(piece, joint)
     how = f"{piece.kind} of link {joint.child}" + ("" if own else ", as drawn")
@@ -239,11 +215,6 @@ def _size(piece: CollisionPiece, joint: UrdfJoint) -> tuple[Floats, float, float
     return middle, r, float(np.ptp(along))
 
 
-def _on_one_axle(a: DrivenWheel, b: DrivenWheel) -> bool:
-    """Return whether two wheels have equal radii and a common axis."""
-    return _turn_about_one_line(a, b) and abs(a.radius - b.radius) <= SAME * a.radius
-
-
 def _turn_about_one_line(a: DrivenWheel, b: DrivenWheel) -> bool:
     apart = b.centre - a.centre
     away = float(np.linalg.norm(apart))
@@ -259,8 +230,9 @@ def _unlike(wheels: Sequence[DrivenWheel]) -> str:
     Heights are ignored: wheels of different radii on one floor have centres at different heights.
     """
     for a, b in itertools.combinations(wheels, 2):
-        level = replace(b, centre=np.array([*b.centre[:2], a.centre[2]]))
-        if _turn_about_one_line(a, level) and abs(a.radius - b.radius) > SAME * a.radius:
+        if abs(a.radius - b.radius) <= SAME * a.radius:
+            continue
+        if _turn_about_one_line(a, replace(b, centre=np.array([*b.centre[:2], a.centre[2]]))):
             radii = " and ".join(f"{wheel.radius:.4g} m (link {wheel.joint.child})" for wheel in (a, b))
             return (
                 f"its wheels have different radii, {radii}; the driven wheels of a differential drive have equal radii"
@@ -268,36 +240,26 @@ def _unlike(wheels: Sequence[DrivenWheel]) -> str:
     return ""
 
 
-def _says(joint: UrdfJoint) -> str:
-    """Return the side in a joint's name; empty without one."""
-    sides = set(re.findall(r"left|right", f"{joint.name} {joint.child}".lower()))
-    return sides.pop() if len(sides) == 1 else ""
-
-
-def _across(a: DrivenWheel, b: DrivenWheel) -> bool:
-    """Return whether the axle is across the root's x axis, so that positions tell left from right."""
+def _in_order(model: UrdfModel, a: DrivenWheel, b: DrivenWheel, *, given: bool) -> Pair:
+    """Return a pair as left and right: along the root's y axis, or by name if the axle has another direction."""
     apart = a.centre - b.centre
-    return abs(float(apart[1])) >= 0.5 * float(np.linalg.norm(apart))
-
-
-def _given_order(a: DrivenWheel, b: DrivenWheel) -> Pair:
-    """Return a pair as given; raise InputError if it is swapped by position and not by name."""
-    if _across(a, b) and a.centre[1] < b.centre[1] and (_says(a.joint), _says(b.joint)) != ("left", "right"):
+    across = abs(float(apart[1])) >= 0.5 * float(np.linalg.norm(apart))
+    by_name = next((pair for pair in ((a, b), (b, a)) if _named_left_first(model, *pair)), None)
+    if given and across and apart[1] < 0 and (by_name is None or by_name[0] is b):
         raise InputError(
             f"--left {a.joint.name} is on the right: y is {a.centre[1]:.3g} m, that of {b.joint.name} {b.centre[1]:.3g} m; "
             f"write --left {b.joint.name} --right {a.joint.name}"
         )
-    return a, b
-
-
-def _in_order(model: UrdfModel, a: DrivenWheel, b: DrivenWheel) -> Pair:
-    """Return a pair as left and right: along the root's y axis, or by name if the axle has another direction."""
-    if _across(a, b):
-        return (a, b) if a.centre[1] > b.centre[1] else (b, a)
-    for first, second in ((a, b), (b, a)):
-        if first.joint.name in model.sides[0] or (_says(first.joint), _says(second.joint)) == ("left", "right"):
-            return first, second
+    if given or across:
+        return (a, b) if given or apart[1] > 0 else (b, a)
+    if by_name is not None:
+        return by_name
     raise input_error(
         str(model.source),
         f"it is not clear which of {a.joint.name} and {b.joint.name} is on the left; give --left and --right",
     )
+
+
+def _named_left_first(model: UrdfModel, a: DrivenWheel, b: DrivenWheel) -> bool:
+    says = [set(re.findall("left|right", wheel.joint.called.lower())) for wheel in (a, b)]
+    return a.joint.name in model.sides[0] or says == [{"left"}, {"right"}]

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -64,6 +65,7 @@ def frames_of_urdf(
     The lidar's frame is the link at the lidar's position, or `base_scan` if there is none.
     """
     from antdrive.robots.importing.fitting import fitted_model
+    from antdrive.robots.importing.sensors import lidar_sensors
 
     fit = fitted_model(path, robot, left=left, right=right, arguments=arguments, packages=packages)
     model, places = fit.model, {link: fit.root @ place for link, place in fit.model.places.items()}
@@ -84,7 +86,7 @@ def frames_of_urdf(
             if abs(place[2, 2]) >= LEVEL and np.linalg.norm(place[:3, 3] - scanner[:3, 3]) <= NEAR
         ]
         if at_lidar:
-            sensors = {sensor.link for sensor in model.lidars}
+            sensors = {sensor.link for sensor in lidar_sensors(model.root, model.places)}
             scan = max(at_lidar, key=lambda link: (link in sensors, SCANNERS.search(link) is not None))
             scanner = places[scan]
         else:
@@ -92,7 +94,8 @@ def frames_of_urdf(
             links.append((base, scan, scanner))
     joints = fit.joints[0].name, fit.joints[1].name
     signs = (math.copysign(1.0, axis) for axis in ((fit.root[:3, :3] @ joint.axis)[1] for joint in fit.joints))
-    return RobotFrames(model.text, base, tuple(links), joints, (next(signs), next(signs)), scan, scanner)
+    text, turning = ElementTree.tostring(model.root, encoding="unicode"), (next(signs), next(signs))
+    return RobotFrames(text, base, tuple(links), joints, turning, scan, scanner)
 
 
 def _unused(name: str, links: Mapping[str, Floats]) -> str:

@@ -26,9 +26,10 @@ def _blank(found: re.Match[bytes]) -> bytes:
     return b"\n" * found[0].count(b"\n") if found[0].startswith(b"<!--") else found[0]
 
 
-def parse_xml(path: Path) -> ET.Element:
-    """Parse an XML file and return its root element."""
-    content = _SPACE.sub(b"", _COMMENT.sub(_blank, read_bytes(path, MAX_BYTES, "an XML file")))
+def parse_xml(path: Path, text: str | None = None) -> ET.Element:
+    """Parse an XML file, or a text made of it, and return its root element."""
+    content = read_bytes(path, MAX_BYTES, "an XML file") if text is None else text.encode()
+    content = _SPACE.sub(b"", _COMMENT.sub(_blank, content))
     parser, builder, depth = expat.ParserCreate(), ET.TreeBuilder(), 0
     parser.buffer_text = True
 
