@@ -34,6 +34,12 @@ TASK_TAG, NAMESPACE = "antdrive:task", "urn:antdrive:task:1"
 #: The model of an exported world's walls, ignored on import: the task element has the bounds.
 WALLS = "antdrive_walls"
 
+#: What the height of the floor is, in this order [m].
+FLOORS: tuple[Callable[[Models], float], ...] = (
+    lambda read: max(read.planes, default=0.0),
+    lambda read: floor_height(read.solids),
+)
+
 
 def import_sdf(
     path: str | os.PathLike[str],
@@ -63,7 +69,8 @@ def import_sdf(
         bounds: the walls' inner faces, in the world's own frame [m]; by default 1 m around the obstacles, start and goal
         cell: the task's grid resolution [m]; by default 0.25, or 0.1 with covered shapes
         goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
-        band: heights between which shapes are obstacles [m]; by default 0.01 and 2 above the floor
+        band: heights in the file between which shapes are obstacles [m]; by default 0.01 and 2 above the floor, which is
+            the highest ground plane, or the top of low plates that cover most of the ground
         resolution: side of the cells on which shapes are covered [m]; by default 0.02, or more in large worlds
         overhang: largest protrusion of cylinders beyond these cells [m]; by default their side
         skip_unsupported: skip unsupported parts and missing models instead of refusing the file
@@ -76,15 +83,17 @@ def import_sdf(
     world = _world_element(file)
     kept = _KeptTask.take(file, world)
     frame = kept.numbers("frame", 3) or (0.0, 0.0, 0.0)
-    if band is not None and not 0 <= band[0] < band[1]:
-        raise FieldError("band", f"must be two heights, LOW,HIGH with 0 <= LOW < HIGH, got {band[0]:g},{band[1]:g}")
-    known = (float(band[0]), float(band[1])) if band else (0.0, math.inf) if kept.values else None
+    if band is not None and not band[0] < band[1]:
+        raise FieldError("band", f"must be two heights, LOW,HIGH with LOW < HIGH, got {band[0]:g},{band[1]:g}")
+    low, high = band or ((0.0, math.inf) if kept.values else BAND)
+    floor = min(float(low), 0.0)
     try:
         reader = SdfReader(file)
-        models = reader.read(world, frame, known or BAND)
-        if known is None and (floor := floor_height(models.solids)):
-            above = reader.read(world, frame, (BAND[0] + floor, BAND[1] + floor), floor)
-            models = above if above.kinds else models
+        models = reader.read(world, frame, (low - floor, high - floor), floor)
+        for rise in FLOORS:
+            if band is None and not kept.values and (higher := rise(models)):
+                above = reader.read(world, frame, BAND, models.floor + higher)
+                models = above if above.kinds else models
         if (models.unsupported or models.missing) and not skip_unsupported:
             raise InputError(_about_unsupported(models))
         covering, reach = cover_pieces(models.solids, models.band, resolution, overhang)
@@ -97,7 +106,7 @@ def import_sdf(
     goal = _in_world(frame, goal) or kept.numbers("goal", 2)
     bounds = bounds or kept.numbers("bounds", 4)
     if bounds is None:
-        bounds = _bounds_around(file, discs, start, goal)
+        bounds = _bounds_around(file, models, discs, start, goal)
     goal = goal or (bounds[2] - MARGIN / 2, bounds[3] - MARGIN / 2)
     if start is None:
         x, y = bounds[0] + MARGIN / 2, bounds[1] + MARGIN / 2
@@ -125,15 +134,13 @@ def import_sdf(
 
 def _about(models: Models, covering: int, reach: float) -> Iterator[str]:
     """Yield what was imported, assumed and ignored."""
-    low, high = models.band
+    low, high = (height + models.floor for height in models.band)
     if models.floor:
-        yield f"the floor is {models.floor:g} m high: low plates cover most of the ground"
+        yield f"the floor is {models.floor:g} m high (a ground plane, or low plates over most ground)"
     if covering:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(models.kinds.items()))
-        yield (
-            f"the shapes between {low:g} and {high:g} m ({kinds}) are fully covered; {covering} of the cylinders "
-            f"cover what is not upright and round, and reach at most {reach + models.facets:.3g} m beyond it"
-        )
+        yield f"shapes between {low:g} and {high:g} m: {kinds}"
+        yield f"cylinders cover them fully, and reach at most {reach + models.facets:.3g} m beyond them"
     if models.sloping > MOST_SLOPING:
         yield f"sloping ground, taken for obstacles: {models.sloping:.0f} m2"
     if models.movers:
@@ -155,6 +162,8 @@ def _world_element(file: Path) -> ET.Element:
     world = root.find("world") if root.tag == "sdf" else None
     if world is None and (root.tag != "sdf" or root.find("model") is None):
         raise input_error(str(file), f"must be an <sdf> with a <world> or a <model> in it, got <{root.tag}>")
+    if len(worlds := [each.get("name", "") for each in root.findall("world")]) > 1:
+        raise input_error(str(file), f"has {len(worlds)} worlds ({', '.join(worlds)}); leave one in it")
     return root if world is None else world
 
 
@@ -215,11 +224,14 @@ def _about_unsupported(models: Models) -> str:
     return "; ".join([*problems, "--skip-unsupported leaves them out"])
 
 
-def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
-    """Return bounds `MARGIN` around the obstacles, start and goal; raise InputError without obstacles."""
-    if not discs:
-        raise input_error(str(file), "has no obstacles between the floor and the robot's height; give the bounds")
+def _bounds_around(file: Path, models: Models, discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
+    """Return bounds `MARGIN` around the obstacles, movers, start and goal; raise InputError without obstacles."""
     spots = [(d.x, d.y, d.radius) for d in discs]
+    spots += [(x, y, ACTOR_RADIUS) for mover in models.movers for _, x, y in mover.keyframes]
+    if not spots:
+        low, high = (height + models.floor for height in models.band)
+        why = "; ".join([f"has no obstacles between {low:g} and {high:g} m", *_about(models, 0, 0.0)])
+        raise input_error(str(file), f"{why}; choose other heights with --band, or give --bounds for an empty world")
     spots += [(end[0], end[1], 0.0) for end in (start, goal) if end is not None]
     return (
         min(x - r for x, _, r in spots) - MARGIN,

@@ -20,7 +20,7 @@ from antdrive.base.plane import format_point
 from antdrive.base.ros import folders_in, ros_package
 from antdrive.base.types import Floats, Pose
 from antdrive.worlds.formats.meshes import read_mesh
-from antdrive.worlds.formats.solids import FACETS, ROUND, Unsupported, numbers, solid
+from antdrive.worlds.formats.solids import BAND, FACETS, ROUND, Unsupported, numbers, solid
 from antdrive.worlds.formats.xml import parse_xml, rotation_matrix
 from antdrive.worlds.movers import Keyframed, Loop
 from antdrive.worlds.world import Disc
@@ -29,7 +29,7 @@ from antdrive.worlds.world import Disc
 VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "SDF_PATH", "GAZEBO_MODEL_PATH")
 FUEL_FOLDERS = ("~/.gz/fuel", "~/.ignition/fuel")  # Fuel's downloads
 CLASSIC_FOLDER = "~/.gazebo/models"  # downloads of Gazebo classic
-USUAL = re.compile(r"(sun|ground[ _]?plane)(/\d+)?/?$", re.IGNORECASE)  # floor and light, under any address
+USUAL = re.compile(r"(^|/)(sun|ground[ _]?plane)(/\d+)?/?$", re.IGNORECASE)  # floor and light, under any address
 DRIVES = re.compile(
     r"diff_?-?drive|skid_?-?steer|ackermann|mecanum|omni|planar_?move|tracked-?vehicle|velocity-?control|multicopter",
     re.IGNORECASE,
@@ -37,6 +37,7 @@ DRIVES = re.compile(
 ACTOR_RADIUS, ACTOR_HEIGHT = 0.3, 1.8  # of an actor, which has no collision shape [m]
 STEEP, FLAT = math.cos(math.radians(45)), math.cos(math.radians(1))  # of the slopes of ground
 MAX_MODELS = 20_000  # with those of included files
+ORIGIN = np.eye(4)  # the pose of a frame in itself
 MAX_NESTING = 50  # of models, and of frames that refer to each other
 
 
@@ -48,12 +49,13 @@ class _Missing(Unsupported):
 class Models:
     """The contents of a world between two heights."""
 
-    band: tuple[float, float]  # the heights [m]
-    floor: float = 0.0  # assumed height of the floor [m]
+    band: tuple[float, float]  # the heights above the floor [m]
+    floor: float = 0.0  # height of the floor in the file [m]
     discs: list[Disc] = field(default_factory=list)  # upright cylinders and spheres
     solids: list[Floats] = field(default_factory=list)  # convex pieces of all other shapes, (K, V, 3)
     facets: float = 0.0  # largest distance of pieces and discs beyond round shapes [m]
     sloping: float = 0.0  # area of imported meshes' surfaces that are neither flat nor steep [m2]
+    planes: list[float] = field(default_factory=list)  # heights of ground planes above the floor [m]
     movers: list[Keyframed] = field(default_factory=list)
     kinds: Counter[str] = field(default_factory=Counter)  # number of imported shapes by kind
     counts: Counter[str] = field(default_factory=Counter)  # of what is assumed or ignored
@@ -83,12 +85,11 @@ class _Scope:
         }
         self._open: set[str] = set()
 
-    def place(self, element: ET.Element, base: str = "") -> Floats:
-        """Return the pose (4, 4) of an element, by default relative to the frame `base`."""
+    def place(self, element: ET.Element, base: Floats = ORIGIN) -> Floats:
+        """Return the pose (4, 4) of an element, by default relative to the pose `base`."""
         pose = element.find("pose")
-        if pose is None:
-            return self.frame(base)
-        return self.frame(pose.get("relative_to") or pose.get("frame") or base) @ read_pose(pose)
+        name = None if pose is None else pose.get("relative_to") or pose.get("frame")
+        return (self.frame(name) if name else base) @ read_pose(pose)
 
     def of_body(self, body: _SdfModel) -> Floats:
         """Return the pose (4, 4) of a model."""
@@ -99,7 +100,7 @@ class _Scope:
     def frame(self, name: str) -> Floats:
         """Return the pose (4, 4) of a frame."""
         if name in ("", "__model__", "world", "__root__"):
-            return np.eye(4)
+            return ORIGIN
         if name in self._open or len(self._open) > MAX_NESTING:
             raise Unsupported(f"frame {name!r} refers to itself")
         first, _, rest = name.partition("::")
@@ -112,25 +113,21 @@ class _Scope:
                 return self.of_body(body) @ body.scope.frame(rest)
             assert part is not None
             base = part.get("attached_to") if part.tag == "frame" else part.findtext("child")
-            return self.place(part, (base or "").strip())
+            return self.place(part, self.frame((base or "").strip()))
         finally:
             self._open.remove(name)
 
 
+@dataclass(frozen=True, eq=False)
 class _Wanted:
-    """A transform from a <world>'s frame to another frame."""
+    """A transform from a <world>'s frame to another frame, of the given pose (4, 4) in it."""
 
-    def __init__(self, frame: Pose) -> None:
-        x, y, yaw = frame
-        self._same = not any(frame)
-        self._frame = _matrix(x, y, 0.0, 0.0, 0.0, yaw)
-        self._back = np.linalg.inv(self._frame)
+    frame: Floats
 
     def __matmul__(self, pose: Floats) -> Floats:
         """Transform a pose (4, 4). The frame's own pose becomes the exact identity."""
-        if self._same:
-            return pose
-        return np.eye(4) if np.array_equal(pose, self._frame) else np.asarray(self._back @ pose)
+        same = np.array_equal(pose, self.frame)
+        return ORIGIN if same else np.asarray(np.linalg.inv(self.frame) @ pose)
 
 
 class SdfReader:
@@ -148,7 +145,8 @@ class SdfReader:
         frame, and its <scale> applies to the shapes.
         """
         self.models, self._count = Models(band, floor), 0
-        wanted, models = _Wanted(frame), self.models
+        x, y, yaw = frame
+        wanted, models = _Wanted(_matrix(x, y, floor, 0.0, 0.0, yaw)), self.models
         states = {state.get("name", ""): state for state in world.findall("state/model")}
         removed = {(name.text or "").strip() for name in world.findall("state/deletions/name")}
         for element in (world, *world.findall("state/insertions")):
@@ -237,8 +235,11 @@ class SdfReader:
                 collisions += 1
                 part = "::".join((name, *(element.get("name") or element.tag for element in (link, collision))))
                 try:
-                    place = links[link.get("name")] if link.get("name") in links else pose @ body.scope.place(link)
-                    self._shape(collision, place @ body.scope.place(collision) @ np.diag([*scale, 1.0]), body.file)
+                    if link.get("name") in links:
+                        place = links[link.get("name")] @ read_pose(collision.find("pose"))
+                    else:
+                        place = pose @ body.scope.place(collision, body.scope.place(link))
+                    self._shape(collision, place @ np.diag([*scale, 1.0]), body.file)
                 except _Missing as missing:
                     models.missing[str(missing)] += 1
                 except (Unsupported, InputError, FieldError) as reason:
@@ -254,11 +255,16 @@ class SdfReader:
         geometry = collision.find("geometry")
         if geometry is None or not len(geometry):
             return
-        found = solid(geometry, place, self.models.band, lambda shape: self._triangles(shape, file))
-        if isinstance(found, str):
-            self.models.counts[found] += 1
-            return
         models, kind = self.models, geometry[0].tag
+        found = solid(geometry, place, models.band, lambda shape: self._triangles(shape, file))
+        if isinstance(found, float):
+            models.planes.append(found)
+            if found > max(models.band[0], BAND[0]):
+                raise Unsupported(f"a plane {found:g} m above the floor")
+            return
+        if isinstance(found, str):
+            models.counts[found] += 1
+            return
         models.kinds[kind] += 1
         if isinstance(found, Disc):
             models.discs.append(found)
@@ -365,7 +371,7 @@ def _model_file(uri: str, source: Path) -> Path | None:
 def read_pose(pose: ET.Element | None) -> Floats:
     """Return the transform (4, 4) of a <pose>: x y z [m] roll pitch yaw [rad] about fixed axes."""
     if pose is None or not (pose.text or "").strip():
-        return np.eye(4)
+        return ORIGIN
     if pose.get("rotation_format", "euler_rpy") != "euler_rpy":
         raise Unsupported(f"a pose with rotation_format={pose.get('rotation_format')!r}")
     x, y, z, *angles = numbers(pose.text, 6, "pose")

@@ -45,7 +45,8 @@ def numbers(text: str | None, count: int, key: str) -> Floats:
         values = np.empty(0)
     if len(values) != count or not (np.abs(values) <= MAX_COORDINATE).all():
         raise Unsupported(
-            f"{key} must be {f'{count} numbers' if count > 1 else 'a number'}, got {(text or '').strip()[:40]!r}"
+            f"{key} must be {f'{count} numbers' if count > 1 else 'a number'} of at most {MAX_COORDINATE:g}, "
+            f"got {(text or '').strip()[:40]!r}"
         )
     return values
 
@@ -119,8 +120,10 @@ def _extruded(shapes: Sequence[ET.Element]) -> Floats:
 
 def solid(
     geometry: ET.Element, place: Floats, band: tuple[float, float], mesh: Callable[[ET.Element], Floats]
-) -> Disc | Floats | str:
+) -> Disc | Floats | float | str:
     """Return a <geometry> between two heights: a disc, convex pieces (K, V, 3), or why nothing of it is there.
+
+    Of a ground plane, return the height [m].
 
     `place` (4, 4) includes the scale; `mesh` returns the triangles (K, 3, 3) of a <mesh>.
     """
@@ -129,9 +132,9 @@ def solid(
         return "empty"
     if shape.tag == "plane":
         normal = place[:3, :3] @ numbers(shape.findtext("normal") or "0 0 1", 3, "normal")
-        if math.hypot(normal[0], normal[1]) > MAX_TILT * abs(normal[2]):
-            raise Unsupported("a plane that is not horizontal")
-        return "flat"
+        if math.hypot(normal[0], normal[1]) > MAX_TILT * normal[2] or not normal[2] > 0:
+            raise Unsupported("a plane that does not face up")
+        return round(float(place[2, 3]), 6)
     if shape.tag in ROUND:
         profile, stretch = _round(shape)
         place = place @ np.diag([*stretch, 1.0])
