@@ -246,3 +246,11 @@ def test_the_highest_ground_plane_is_the_floor(tmp_path):
 def test_planes_that_are_no_floor_are_refused(odd, why, tmp_path):
     with pytest.raises(ValueError, match=why):
         imported(tmp_path, placed("<box><size>1 1 0.5</size></box>", (3, 0, 0.25, 0, 0, 0)), odd)
+
+
+def test_a_stage_on_the_ground_is_an_obstacle(tmp_path):
+    stage = placed("<box><size>6 4 0.25</size></box>", (0, 0, 0.125, 0, 0, 0))
+    post = placed("<box><size>0.2 0.2 1</size></box>", (5, 2.4, 0.5, 0, 0, 0), "post")
+    made = imported(tmp_path, stage, post)
+    assert "the floor is" not in made.source
+    assert gaps(made, np.array([[2.9, 0.0]])) < 0

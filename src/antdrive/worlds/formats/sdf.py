@@ -136,7 +136,7 @@ def _about(models: Models, covering: int, reach: float) -> Iterator[str]:
     """Yield what was imported, assumed and ignored."""
     low, high = (height + models.floor for height in models.band)
     if models.floor:
-        yield f"the floor is {models.floor:g} m high (a ground plane, or low plates over most ground)"
+        yield f"the floor is {models.floor:g} m high: a ground plane, or low plates, whose edges are open"
     if covering:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(models.kinds.items()))
         yield f"shapes between {low:g} and {high:g} m: {kinds}"

@@ -16,7 +16,7 @@ import numpy as np
 from antdrive.base.errors import input_error
 from antdrive.base.plane import tidy
 from antdrive.base.types import Floats
-from antdrive.worlds.formats.cellmap import MAX_DISCS, SLACK, cover_inside, progress_part
+from antdrive.worlds.formats.cellmap import MAX_DISCS, SLACK, cover_inside
 from antdrive.worlds.limits import MAX_COORDINATE
 from antdrive.worlds.world import Disc
 
@@ -29,7 +29,7 @@ MAX_TILES = 500  # with obstacles
 BAND = (0.01, 2.0)  # default heights between which shapes are obstacles, above the floor [m]
 CELL, COARSEST = 0.02, 1.0  # smallest and largest default side of a cell [m]
 MOST_RIMS = 60_000  # sides of blocked cells along free ones, of default cells: about 8,000 discs
-HIGHEST_FLOOR = 0.3  # of plates that cover most of the ground [m]
+HIGHEST_FLOOR, MOST_GROUND = 0.3, 0.75  # height [m] of plates that are the floor, and their least share of the ground
 MAX_POINTS = 10_000  # of a polyline
 
 
@@ -183,7 +183,7 @@ def floor_height(solids: Sequence[Floats]) -> float:
     covered = np.bincount((top[low] / BAND[0]).round().astype(np.int64), np.concatenate(areas)[low])
     ends = np.array([[p[:, :, :2].min(axis=(0, 1)), p[:, :, :2].max(axis=(0, 1))] for p in solids])
     ground = float(np.prod(ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)))
-    return BAND[0] * float(np.flatnonzero(covered > ground / 2).max(initial=0))
+    return BAND[0] * float(np.flatnonzero(covered > MOST_GROUND * ground).max(initial=0))
 
 
 def cover_pieces(
@@ -203,21 +203,19 @@ def cover_pieces(
         raise input_error(f"its shapes reach over too many cells of {side:g} m; give larger ones with --resolution")
     discs: list[Disc] = []
     reach = 0.0
-    for number, (tile, parts) in enumerate(sorted(tiles.items(), key=lambda item: item[0])):
-        with progress_part(number, len(tiles)):
-            corner, tops = _rasterised(tile, parts, band, side)
-            covered = cover_inside(tops > -np.inf, side, (corner[0], corner[1]), side if overhang is None else overhang)
-            reach = max(reach, covered.overhang)
-            for x, y, radius in covered.discs.tolist():
-                row, col = (y - corner[1]) / side, (x - corner[0]) / side
-                low, high = (math.floor(max(v - radius / side, 0.0)) for v in (row, col)), radius / side
-                rows, cols = (slice(first, math.floor(v + high) + 1) for first, v in zip(low, (row, col), strict=True))
-                discs.append(Disc(tidy(x), tidy(y), radius, float(tops[rows, cols].max())))
+    for number, tile in enumerate(sorted(tiles), 1):
+        (x0, y0), tops = _rasterised(tile, tiles[tile], band, side)
+        blocked, most = tops > -np.inf, side if overhang is None else overhang
+        covered = cover_inside(blocked, side, (x0, y0), most, number / len(tiles))
+        reach = max(reach, covered.overhang)
+        for x, y, radius in covered.discs.tolist():
+            left, right, low, high = (
+                int(max(v, 0.0) / side) for v in (x - radius - x0, x + radius - x0, y - radius - y0, y + radius - y0)
+            )
+            discs.append(Disc(tidy(x), tidy(y), radius, float(tops[low : high + 1, left : right + 1].max())))
     if len(discs) > MAX_DISCS:
-        problem = (
-            f"needs {len(discs)} cylinders; the limit is {MAX_DISCS}; a larger --resolution or --overhang needs fewer"
-        )
-        raise input_error(problem)
+        fewer = "a larger --resolution or --overhang needs fewer"
+        raise input_error(f"needs {len(discs)} cylinders; the limit is {MAX_DISCS}; {fewer}")
     return discs, reach + math.sqrt(2.0) * side
 
 
