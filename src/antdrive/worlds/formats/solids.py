@@ -15,7 +15,7 @@ import numpy as np
 
 from antdrive.base.errors import input_error
 from antdrive.base.plane import tidy
-from antdrive.base.types import Floats
+from antdrive.base.types import Floats, Point
 from antdrive.worlds.formats.cellmap import MAX_DISCS, SLACK, cover_inside
 from antdrive.worlds.limits import MAX_COORDINATE
 from antdrive.worlds.world import Disc
@@ -170,20 +170,15 @@ def _where(z: Floats, band: tuple[float, float]) -> str:
 
 def floor_height(solids: Sequence[Floats]) -> float:
     """Return the height of the floor [m]: of the top of low plates that cover most of the ground, or 0."""
-    tops, areas = [np.empty(0)], [np.empty(0)]
-    for pieces in solids:
-        z, is_box = pieces[:, :, 2], pieces.shape[1] == 8
-        one, two = (pieces[:, i, :2] - pieces[:, 0, :2] for i in ((4, 2) if is_box else (1, 2)))
-        area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-        areas.append(np.abs(area) if is_box else area.clip(min=0) * (np.ptp(z, axis=1) < BAND[0]) / 2)
-        tops.append(z.max(axis=1))
-    low = ((top := np.concatenate(tops)) > 0) & (top <= HIGHEST_FLOOR)
-    if not low.any():
+    low = [pieces[pieces[:, :, 2].max(axis=1) <= HIGHEST_FLOOR] for pieces in solids]
+    if not any(map(len, low)):
         return 0.0
-    covered = np.bincount((top[low] / BAND[0]).round().astype(np.int64), np.concatenate(areas)[low])
-    ends = np.array([[p[:, :, :2].min(axis=(0, 1)), p[:, :, :2].max(axis=(0, 1))] for p in solids])
-    ground = float(np.prod(ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)))
-    return BAND[0] * float(np.flatnonzero(covered > MOST_GROUND * ground).max(initial=0))
+    points = np.concatenate([pieces[:, :, :2].reshape(-1, 2) for pieces in solids])
+    corner, extent = points.min(axis=0), np.ptp(points, axis=0)
+    cell = float(extent.max()) / TILE
+    tops = _rasterised((corner[0], corner[1]), low, (0.0, HIGHEST_FLOOR), cell)
+    areas = np.bincount((tops[tops > 0] / BAND[0]).round().astype(np.int64), minlength=1) * cell**2
+    return BAND[0] * float(areas.argmax()) if areas.max() > MOST_GROUND * extent.prod() else 0.0
 
 
 def cover_pieces(
@@ -204,7 +199,8 @@ def cover_pieces(
     discs: list[Disc] = []
     reach = 0.0
     for number, tile in enumerate(sorted(tiles), 1):
-        (x0, y0), tops = _rasterised(tile, tiles[tile], band, side)
+        x0, y0 = tile
+        tops = _rasterised(tile, tiles[tile], band, side)
         blocked, most = tops > -np.inf, side if overhang is None else overhang
         covered = cover_inside(blocked, side, (x0, y0), most, number / len(tiles))
         reach = max(reach, covered.overhang)
@@ -219,36 +215,31 @@ def cover_pieces(
     return discs, reach + math.sqrt(2.0) * side
 
 
-_Tiles = dict[tuple[int, int], list[Floats]]
-
-
-def _tiles(solids: Sequence[Floats], cell: float) -> _Tiles | None:
-    """Return the pieces in each tile of cells; None if there are too many tiles."""
-    tiles: _Tiles = {}
+def _tiles(solids: Sequence[Floats], cell: float) -> dict[Point, list[Floats]] | None:
+    """Return the pieces in each tile of cells by its lower left corner [m]; None if there are too many tiles."""
+    tiles: dict[Point, list[Floats]] = {}
     for pieces in solids:
         ends = np.hstack([pieces[:, :, :2].min(axis=1), pieces[:, :, :2].max(axis=1)])
         spans, span_of = np.unique(np.floor(ends / (TILE * cell)).astype(np.int64), axis=0, return_inverse=True)
         for n, (left, below, right, above) in enumerate(spans.tolist()):
             if len(tiles) + (right - left + 1) * (above - below + 1) > MAX_TILES:
                 return None
-            for tile in itertools.product(range(left, right + 1), range(below, above + 1)):
-                tiles.setdefault(tile, []).append(pieces[span_of.ravel() == n])
+            for col, row in itertools.product(range(left, right + 1), range(below, above + 1)):
+                tiles.setdefault((col * TILE * cell, row * TILE * cell), []).append(pieces[span_of.ravel() == n])
     return tiles
 
 
-def _rims(tiles: _Tiles, band: tuple[float, float], cell: float) -> int:
+def _rims(tiles: dict[Point, list[Floats]], band: tuple[float, float], cell: float) -> int:
     """Return how many blocked cells have a free neighbour to the right or above."""
-    blocked = (_rasterised(tile, parts, band, cell)[1] > -np.inf for tile, parts in tiles.items())
-    return sum(int((cells[1:] != cells[:-1]).sum() + (cells[:, 1:] != cells[:, :-1]).sum()) for cells in blocked)
+    blocked = (_rasterised(corner, parts, band, cell) > -np.inf for corner, parts in tiles.items())
+    return sum(int(np.count_nonzero(np.diff(cells, axis=axis))) for cells in blocked for axis in (0, 1))
 
 
-def _rasterised(
-    tile: tuple[int, int], parts: Sequence[Floats], band: tuple[float, float], cell: float
-) -> tuple[list[float], Floats]:
-    """Return a tile's lower left corner [m] and the tops of the pieces over its cells (TILE, TILE); -inf where none are."""
+def _rasterised(corner: Point, parts: Sequence[Floats], band: tuple[float, float], cell: float) -> Floats:
+    """Return the tops of pieces over the cells (TILE, TILE) from a lower left corner [m]; -inf where none are."""
     from antdrive.worlds.formats._kernels_cover import mark_pieces
 
-    corner, tops = np.array(tile) * (TILE * cell), np.full((TILE, TILE), -np.inf)
+    tops = np.full((TILE, TILE), -np.inf)
     for pieces in parts:
-        mark_pieces(pieces, *band, corner, cell, SLACK, tops)
-    return corner.tolist(), tops
+        mark_pieces(pieces, *band, np.array(corner), cell, SLACK, tops)
+    return tops
