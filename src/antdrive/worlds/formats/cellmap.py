@@ -293,8 +293,8 @@ def connected(free: Cells, ends: Iterable[tuple[int, int]]) -> Cells:
     return reached
 
 
-def largest_ground(cells: CellMap) -> tuple[Pose, Point]:
-    """Return a start and a goal on the largest connected part of a map, far from blocked cells.
+def largest_ground(cells: CellMap, most: int = MOST_EROSIONS) -> tuple[Pose, Point]:
+    """Return a start and a goal on the largest connected part of a map, up to `most` cells away from blocked ones.
 
     Raises:
         InputError: no two free cells are connected.
@@ -307,8 +307,8 @@ def largest_ground(cells: CellMap) -> tuple[Pose, Point]:
         largest = max(largest, part, key=np.count_nonzero)
     if np.count_nonzero(largest) < 2:
         raise input_error("map", "has no two connected free cells")
-    for _ in range(MOST_EROSIONS):
-        inner = largest & ~_beside(~largest)
+    for _ in range(most):
+        inner = ~_beside(~np.pad(largest, 1))[1:-1, 1:-1]
         if np.count_nonzero(inner) < 2:
             break
         largest = inner

@@ -16,6 +16,7 @@ from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.plane import map_to_world
 from antdrive.base.types import Bounds, Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
+from antdrive.worlds.formats.cellmap import cell_map, largest_ground
 from antdrive.worlds.formats.sdf_models import ACTOR_RADIUS, VARIABLES, Models, SdfReader
 from antdrive.worlds.formats.solids import BAND, cover_pieces, floor_height
 from antdrive.worlds.formats.xml import parse_xml
@@ -64,8 +65,8 @@ def import_sdf(
 
     Args:
         path: the SDF file
-        start: the robot's start pose in the file's coordinates [m, m, rad]; by default at the lower left, towards the goal
-        goal: the goal position in the file's coordinates [m]; by default at the upper right
+        start: the robot's start pose in the file's coordinates [m, m, rad]; by default on the largest connected ground
+        goal: the goal position in the file's coordinates [m]; by default there, too
         bounds: the walls' inner faces, in the world's own frame [m]; by default 1 m around the obstacles, start and goal
         cell: the task's grid resolution [m]; by default 0.25, or 0.1 with covered shapes
         goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
@@ -107,28 +108,17 @@ def import_sdf(
     bounds = bounds or kept.numbers("bounds", 4)
     if bounds is None:
         bounds = _bounds_around(file, models, discs, start, goal)
-    goal = goal or (bounds[2] - MARGIN / 2, bounds[3] - MARGIN / 2)
-    if start is None:
-        x, y = bounds[0] + MARGIN / 2, bounds[1] + MARGIN / 2
-        start = x, y, math.atan2(goal[1] - y, goal[0] - x)
+    cell = kept.number("cell", _cell(bounds, FINE if covering else CELL)) if cell is None else cell
+    tolerance = kept.number("goal_tolerance", TOLERANCE) if goal_tolerance is None else goal_tolerance
     about = "; ".join([f"imported from {file.name}", *_about(models, len(covering), reach)])
+    source = kept.values.get("source") if kept.values else about
     try:
-        return Task(
-            World(
-                kept.text("name", file.stem),
-                bounds,
-                tuple(discs),
-                kept.values.get("source") if kept.values else about,
-                tuple(models.movers),
-            ),
-            start,
-            goal,
-            kept.number("goal_tolerance", TOLERANCE) if goal_tolerance is None else goal_tolerance,
-            kept.number("cell", _cell(bounds, FINE if covering else CELL)) if cell is None else cell,
-            kept.number("time_limit", None),
-            frame=frame,
-        )
-    except FieldError as error:
+        made = World(kept.text("name", file.stem), bounds, tuple(discs), source, tuple(models.movers))
+        if start is None or goal is None:
+            usual_start, usual_goal = largest_ground(cell_map(made, cell), math.ceil(MARGIN / 2 / cell))
+            start, goal = start or usual_start, goal or usual_goal
+        return Task(made, start, goal, tolerance, cell, kept.number("time_limit", None), frame=frame)
+    except (FieldError, InputError) as error:
         raise input_error(str(file), str(error)) from None
 
 
