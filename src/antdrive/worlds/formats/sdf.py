@@ -13,7 +13,7 @@ from xml.sax.saxutils import quoteattr
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.plane import map_to_world
+from antdrive.base.plane import end_in_world
 from antdrive.base.types import Bounds, Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
 from antdrive.worlds.formats.cellmap import cell_map, largest_ground
@@ -103,8 +103,8 @@ def import_sdf(
     if on_skipped is not None:
         on_skipped([*models.unsupported, *(f"{uri} (not found)" for uri in models.missing)])
     discs = [*models.discs, *covering]
-    start = _in_world(frame, start) or kept.numbers("start", 3)
-    goal = _in_world(frame, goal) or kept.numbers("goal", 2)
+    start = end_in_world(frame, start) or kept.numbers("start", 3)
+    goal = end_in_world(frame, goal) or kept.numbers("goal", 2)
     bounds = bounds or kept.numbers("bounds", 4)
     if bounds is None:
         bounds = _bounds_around(file, models, discs, start, goal)
@@ -113,7 +113,7 @@ def import_sdf(
     about = "; ".join([f"imported from {file.name}", *_about(models, len(covering), reach)])
     source = kept.values.get("source") if kept.values else about
     try:
-        made = World(kept.text("name", file.stem), bounds, tuple(discs), source, tuple(models.movers))
+        made = World(kept.values.get("name", file.stem), bounds, tuple(discs), source, tuple(models.movers))
         if start is None or goal is None:
             usual_start, usual_goal = largest_ground(cell_map(made, cell), math.ceil(MARGIN / 2 / cell))
             start, goal = start or usual_start, goal or usual_goal
@@ -138,11 +138,6 @@ def _about(models: Models, covering: int, reach: float) -> Iterator[str]:
     names = {"flat": f"shapes up to {low:g} m, taken for floor", "above": f"shapes above {high:g} m, no obstacles"}
     for what, count in models.counts.items():
         yield what if what.startswith("left out") else f"{names.get(what, what)}: {count}"
-
-
-def _in_world(frame: Pose, end: Any) -> Any:
-    """Transform a start or a goal from the file's coordinates to the world's frame."""
-    return tuple(map_to_world(frame, [end])[0].tolist()) if end is not None and any(frame) else end
 
 
 def _world_element(file: Path) -> ET.Element:
@@ -174,9 +169,6 @@ class _KeptTask:
             world.remove(model)
         return cls(file, dict(element.attrib))
 
-    def text(self, key: str, default: str) -> str:
-        return self.values.get(key, default)
-
     def numbers(self, key: str, count: int) -> Any:
         """Return the numbers under a key as a tuple; None without the key."""
         if key not in self.values:
@@ -198,19 +190,15 @@ class _KeptTask:
 
 def _about_unsupported(models: Models) -> str:
     """Return in one line what of a world cannot be imported, and what helps."""
-    problems = []
-    if models.missing:
-        folders = f"name their folder in {VARIABLES[0]} (or {', '.join(VARIABLES[1:])})"
-        fuel = (
-            "; download Fuel's with: gz fuel download -u URL" if any("://fuel" in uri for uri in models.missing) else ""
-        )
-        problems.append(
-            f"models and meshes not found ({len(models.missing)}): {', '.join(models.missing)}; {folders}{fuel}"
-        )
-    if models.unsupported:
-        more = len(models.unsupported) - 5
-        names = ", ".join(models.unsupported[:5]) + (f" and {more} more" if more > 0 else "")
-        problems.append(f"parts that cannot be imported ({len(models.unsupported)}): {names}")
+    problems, missing, parts = [], models.missing, models.unsupported
+    if missing:
+        problems.append(f"models and meshes not found ({len(missing)}): {', '.join(missing)}")
+        problems.append(f"name their folder in {VARIABLES[0]} (or {', '.join(VARIABLES[1:])})")
+    if any("://fuel" in uri for uri in missing):
+        problems.append("download Fuel's with: gz fuel download -u URL")
+    if parts:
+        names = ", ".join(parts[:5]) + (f" and {len(parts) - 5} more" if parts[5:] else "")
+        problems.append(f"parts that cannot be imported ({len(parts)}): {names}")
     return "; ".join([*problems, "--skip-unsupported leaves them out"])
 
 

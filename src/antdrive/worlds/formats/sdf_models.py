@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import os
@@ -155,12 +156,11 @@ class SdfReader:
                 raise InputError(f"has more than {MAX_MODELS} models, with the included ones")
             for body in scope.bodies:
                 if body.name not in removed:
-                    self._add(scope, body, body.name, wanted, False, states.get(body.name))
+                    with self._naming(body.name):
+                        self._add(scope, body, body.name, wanted, False, states.get(body.name))
         for actor in world.findall("actor"):
-            try:
+            with self._naming(actor.get("name", "actor")):
                 self._actor(actor, wanted)
-            except (Unsupported, FieldError) as reason:
-                models.unsupported.append(f"{actor.get('name', 'actor')} ({reason})")
         models.unsupported += [f"{e.get('name', 'population')} (population)" for e in world.findall("population")]
         return models
 
@@ -180,7 +180,7 @@ class SdfReader:
             if child.tag != "include":
                 continue
             uri, name = ((child.findtext(tag) or "").strip() for tag in ("uri", "name"))
-            try:
+            with self._naming(name or uri or "include"):
                 if USUAL.search(uri):
                     continue
                 found = self._model(uri, file)
@@ -197,10 +197,16 @@ class SdfReader:
                 else:
                     inner = self._scope(model, found, (*trail, found))
                     yield _SdfModel(name or model.get("name", uri), model, child, found, inner)
-            except _Missing as missing:
-                self.models.missing[str(missing)] += 1
-            except (Unsupported, InputError) as error:
-                self.models.unsupported.append(f"{name or uri or 'include'} ({error})")
+
+    @contextlib.contextmanager
+    def _naming(self, part: str) -> Iterator[None]:
+        """Name a part that is missing or unsupported, and go on."""
+        try:
+            yield
+        except _Missing as missing:
+            self.models.missing[str(missing)] += 1
+        except (Unsupported, InputError, FieldError) as reason:
+            self.models.unsupported.append(f"{part} ({reason})")
 
     def _add(
         self, scope: _Scope, body: _SdfModel, name: str, frame: Floats | _Wanted, static: bool, state: ET.Element | None
@@ -211,19 +217,15 @@ class SdfReader:
         """
         models, model = self.models, body.model
         static = static or any(_true(element.findtext("static")) for element in (model, body.placed))
-        try:
-            pose = frame @ scope.of_body(body)
-            scale, links = np.ones(3), {}
-            if state is not None:
-                pose = frame @ read_pose(state.find("pose")) if state.find("pose") is not None else pose
-                scale = numbers(state.findtext("scale") or "1 1 1", 3, "scale")
-                placed = [link for link in state.findall("link") if link.find("pose") is not None]
-                links = {link.get("name"): frame @ read_pose(link.find("pose")) for link in placed}
-            if not (scale > 0).all():
-                raise Unsupported(f"scaled by {scale.min():g}")
-        except Unsupported as reason:
-            models.unsupported.append(f"{name} ({reason})")
-            return
+        pose = frame @ scope.of_body(body)
+        scale, links = np.ones(3), {}
+        if state is not None:
+            pose = frame @ read_pose(state.find("pose")) if state.find("pose") is not None else pose
+            scale = numbers(state.findtext("scale") or "1 1 1", 3, "scale")
+            placed = [link for link in state.findall("link") if link.find("pose") is not None]
+            links = {link.get("name"): frame @ read_pose(link.find("pose")) for link in placed}
+        if not (scale > 0).all():
+            raise Unsupported(f"scaled by {scale.min():g}")
         plugins = [plugin for element in (model, body.placed) for plugin in element.findall("plugin")]
         if any(DRIVES.search(f"{plugin.get('name')} {plugin.get('filename')}") for plugin in plugins):
             at = format_point((float(pose[0, 3]), float(pose[1, 3])), 2)
@@ -234,22 +236,19 @@ class SdfReader:
             for collision in link.findall("collision"):
                 collisions += 1
                 part = "::".join((name, *(element.get("name") or element.tag for element in (link, collision))))
-                try:
+                with self._naming(part):
                     if link.get("name") in links:
                         place = links[link.get("name")] @ read_pose(collision.find("pose"))
                     else:
                         place = pose @ body.scope.place(collision, body.scope.place(link))
                     self._shape(collision, place @ np.diag([*scale, 1.0]), body.file)
-                except _Missing as missing:
-                    models.missing[str(missing)] += 1
-                except (Unsupported, InputError, FieldError) as reason:
-                    models.unsupported.append(f"{part} ({reason})")
         if not (collisions or body.scope.bodies):
             models.counts["models without collision shapes"] += 1
         if sum(models.kinds.values()) > before and not static:
             models.counts["bodies that could move, taken to stand still"] += 1
         for inner in body.scope.bodies:
-            self._add(body.scope, inner, f"{name}::{inner.name}", pose, static, None)
+            with self._naming(f"{name}::{inner.name}"):
+                self._add(body.scope, inner, f"{name}::{inner.name}", pose, static, None)
 
     def _shape(self, collision: ET.Element, place: Floats, file: Path) -> None:
         geometry = collision.find("geometry")
@@ -268,15 +267,15 @@ class SdfReader:
         models.kinds[kind] += 1
         if isinstance(found, Disc):
             models.discs.append(found)
-        else:
-            models.solids.append(found)
-        if kind == "mesh" and not isinstance(found, Disc):
+            models.facets = max(models.facets, FACETS * found.radius * (kind != "cylinder"))
+            return
+        models.solids.append(found)
+        if kind == "mesh":
             normals = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
             upward, size = normals[:, 2], np.linalg.norm(normals, axis=1)
             models.sloping += float(upward[(upward > STEEP * size) & (upward < FLAT * size)].sum()) / 2
-        if kind in ROUND and not (isinstance(found, Disc) and kind == "cylinder"):
-            size = found.radius if isinstance(found, Disc) else float(np.ptp(found.reshape(-1, 3), axis=0).max()) / 2
-            models.facets = max(models.facets, FACETS * size)
+        if kind in ROUND:
+            models.facets = max(models.facets, FACETS * float(np.ptp(found.reshape(-1, 3), axis=0).max()) / 2)
 
     def _triangles(self, shape: ET.Element, file: Path) -> Floats:
         """Return the triangles of a <mesh>, (K, 3, 3) [m]."""
@@ -336,9 +335,7 @@ def _candidates(uri: str, source: Path) -> Iterator[Path]:
         inside = "/".join(files).rstrip("/").partition("files/")[2]
         for home in FUEL_FOLDERS:
             folder = Path(os.path.expanduser(home), server, owner.lower(), "models", name.lower())
-            versions = (
-                [path for path in folder.glob("*") if path.name.isdecimal()] if name and os.path.isdir(folder) else []
-            )
+            versions = [path for path in folder.glob("*") if path.name.isdecimal()] if os.path.isdir(folder) else []
             yield from (path / inside for path in sorted(versions, key=lambda path: -int(path.name)))
         rest = f"{name}/{inside}"
     if not rest.strip("/"):
