@@ -353,15 +353,12 @@ def _model_file(uri: str, source: Path) -> Path | None:
     for path in _candidates(uri, source):
         if os.path.isfile(path) and path.suffix.lower() in (".sdf", ".world", ".urdf", ".xml"):
             return _real(path)
-        if os.path.isfile(path / "model.config"):
-            files = [
-                (e.get("version", ""), (e.text or "").strip()) for e in parse_xml(path / "model.config").iter("sdf")
-            ]
-            named = [path / name for _, name in sorted(files, reverse=True) if os.path.isfile(path / name)]
-            if named:
-                return _real(named[0])
-        if os.path.isfile(path / "model.sdf"):
-            return _real(path / "model.sdf")
+        config = path / "model.config"
+        entries = parse_xml(config).iter("sdf") if os.path.isfile(config) else ()
+        named = sorted(((e.get("version", ""), (e.text or "").strip()) for e in entries), reverse=True)
+        for _, name in (*named, ("", "model.sdf")):
+            if os.path.isfile(path / name):
+                return _real(path / name)
     return None
 
 

@@ -51,10 +51,11 @@ def numbers(text: str | None, count: int, key: str) -> Floats:
     return values
 
 
-def _sizes(shape: ET.Element, *keys: str) -> list[float]:
-    values = [float(numbers(shape.findtext(key), 1, key)[0]) for key in keys]
-    if not min(values) > 0:
-        raise Unsupported(f"a {shape.tag} of {' and '.join(f'{k} {v:g}' for k, v in zip(keys, values, strict=True))}")
+def _sizes(shape: ET.Element, *keys: str, count: int = 1) -> Floats:
+    """Parse so many positive numbers under each key."""
+    values = np.concatenate([numbers(shape.findtext(key), count, key) for key in keys])
+    if not (values > 0).all():
+        raise Unsupported(f"a {shape.tag} of {' and '.join(keys)} {' '.join(f'{v:g}' for v in values)}")
     return values
 
 
@@ -63,12 +64,9 @@ def _round(shape: ET.Element) -> tuple[Floats, Floats]:
     half = np.linspace(-math.pi / 2, math.pi / 2, ARC + 1)
     arc = np.column_stack([np.sin(half), np.cos(half)]) / math.cos(math.pi / ARC / 2)
     if shape.tag == "sphere":
-        return arc * _sizes(shape, "radius")[0], np.ones(3)
+        return arc * _sizes(shape, "radius"), np.ones(3)
     if shape.tag == "ellipsoid":
-        radii = numbers(shape.findtext("radii"), 3, "radii")
-        if not (radii > 0).all():
-            raise Unsupported(f"an ellipsoid of radii {radii.min():g}")
-        return arc, radii
+        return arc, _sizes(shape, "radii", count=3)
     radius, length = _sizes(shape, "radius", "length")
     ends = np.array([(-length / 2, radius), (length / 2, 0.0 if shape.tag == "cone" else radius)])
     if shape.tag != "capsule":
@@ -143,13 +141,10 @@ def solid(
         across, axis = np.linalg.norm(place[:3, :3], axis=0), place[:3, 2]
         if math.hypot(axis[0], axis[1]) <= MAX_TILT * across[2] and abs(across[0] - across[1]) <= 1e-9:
             z = place[2, 3] + place[2, 2] * profile[:, 0]
-            return _upright(profile, place, *band) or _where(z, band)
+            return _upright(profile, place, *band) or ("flat" if z.max() <= band[0] else "above")
         pieces = _wedges(profile)
     elif shape.tag == "box":
-        size = numbers(shape.findtext("size"), 3, "size")
-        if not (size > 0).all():
-            raise Unsupported(f"a box of size {' '.join(f'{v:g}' for v in size)}")
-        pieces = np.array([list(itertools.product((-0.5, 0.5), repeat=3))]) * size
+        pieces = np.array([list(itertools.product((-0.5, 0.5), repeat=3))]) * _sizes(shape, "size", count=3)
     elif shape.tag == "polyline":
         pieces = _extruded(geometry.findall("polyline"))
     elif shape.tag == "mesh":
@@ -161,11 +156,7 @@ def solid(
         raise Unsupported(f"reaches beyond {MAX_COORDINATE:g} m")
     z = pieces[:, :, 2]
     reaching = pieces[(z.max(axis=1) > band[0]) & (z.min(axis=1) < band[1])]
-    return reaching if len(reaching) else _where(z, band)
-
-
-def _where(z: Floats, band: tuple[float, float]) -> str:
-    return "flat" if z.max() <= band[0] else "above"
+    return reaching if len(reaching) else "flat" if z.max() <= band[0] else "above"
 
 
 def floor_height(solids: Sequence[Floats]) -> float:
