@@ -115,7 +115,8 @@ def import_sdf(
     try:
         made = World(kept.values.get("name", file.stem), bounds, tuple(discs), source, tuple(models.movers))
         if start is None or goal is None:
-            usual_start, usual_goal = largest_ground(cell_map(made, cell), math.ceil(MARGIN / 2 / cell))
+            ground = cell_map(made, _cell(bounds, FINE))
+            usual_start, usual_goal = largest_ground(ground, math.ceil(MARGIN / 2 / ground.resolution))
             start, goal = start or usual_start, goal or usual_goal
         return Task(made, start, goal, tolerance, cell, kept.number("time_limit", None), frame=frame)
     except (FieldError, InputError) as error:
