@@ -172,6 +172,12 @@ def test_links_are_relative_to_links_joints_and_the_model(tmp_path):
     assert places(world(tmp_path, model)) == [(11, 0), (12, 0), (12, 1), (10, 3)]
 
 
+def test_a_frame_may_be_attached_to_a_link_that_is_placed_in_it(tmp_path):
+    frame = "<frame name='f' attached_to='l'><pose relative_to='__model__'>3 4 0 0 0 0</pose></frame>"
+    link = f"<link name='l'><pose relative_to='f'>1 0 0.5 0 0 0</pose><collision name='c'>{POST}</collision></link>"
+    assert places(world(tmp_path, f"<model name='m'>{frame}{link}</model>")) == [(4, 4)]
+
+
 def test_a_placement_frame_is_what_the_pose_places(tmp_path):
     frame = "<pose>5 5 0 0 0 0</pose><frame name='corner'><pose>1 0 0 0 0 0</pose></frame>"
     assert places(world(tmp_path, post(frame, attributes="placement_frame='corner'"))) == [(4, 5)]

@@ -35,12 +35,6 @@ TASK_TAG, NAMESPACE = "antdrive:task", "urn:antdrive:task:1"
 #: The model of an exported world's walls, ignored on import: the task element has the bounds.
 WALLS = "antdrive_walls"
 
-#: What the height of the floor is, in this order [m].
-FLOORS: tuple[Callable[[Models], float], ...] = (
-    lambda read: max(read.planes, default=0.0),
-    lambda read: floor_height(read.solids),
-)
-
 
 def import_sdf(
     path: str | os.PathLike[str],
@@ -91,9 +85,9 @@ def import_sdf(
     try:
         reader = SdfReader(file)
         models = reader.read(world, frame, (low - floor, high - floor), floor)
-        for rise in FLOORS:
-            if band is None and not kept.values and (higher := rise(models)):
-                above = reader.read(world, frame, BAND, models.floor + higher)
+        for plates in (False, True) if band is None and not kept.values else ():
+            if rise := floor_height(models.solids) if plates else max(models.planes, default=0.0):
+                above = reader.read(world, frame, BAND, models.floor + rise)
                 models = above if above.kinds else models
         if (models.unsupported or models.missing) and not skip_unsupported:
             raise InputError(_about_unsupported(models))
@@ -185,8 +179,7 @@ class _KeptTask:
 
     def number(self, key: str, default: Any) -> Any:
         """Return the number under a key."""
-        (number,) = self.numbers(key, 1) or (default,)
-        return number
+        return (self.numbers(key, 1) or (default,))[0]
 
 
 def _about_unsupported(models: Models) -> str:

@@ -86,11 +86,11 @@ class _Scope:
         }
         self._open: set[str] = set()
 
-    def place(self, element: ET.Element, base: Floats = ORIGIN) -> Floats:
-        """Return the pose (4, 4) of an element, by default relative to the pose `base`."""
+    def place(self, element: ET.Element, base: str | Floats = "") -> Floats:
+        """Return the pose (4, 4) of an element, by default relative to a frame or a pose `base`."""
         pose = element.find("pose")
-        name = None if pose is None else pose.get("relative_to") or pose.get("frame")
-        return (self.frame(name) if name else base) @ read_pose(pose)
+        base = (None if pose is None else pose.get("relative_to") or pose.get("frame")) or base
+        return (self.frame(base) if isinstance(base, str) else base) @ read_pose(pose)
 
     def of_body(self, body: _SdfModel) -> Floats:
         """Return the pose (4, 4) of a model."""
@@ -114,7 +114,7 @@ class _Scope:
                 return self.of_body(body) @ body.scope.frame(rest)
             assert part is not None
             base = part.get("attached_to") if part.tag == "frame" else part.findtext("child")
-            return self.place(part, self.frame((base or "").strip()))
+            return self.place(part, (base or "").strip())
         finally:
             self._open.remove(name)
 
