@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -67,6 +67,11 @@ def map_to_world(frame: Pose, points: npt.ArrayLike) -> Floats:
     x, y, yaw = frame
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return world_to_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
+
+
+def end_in_world(frame: Pose, end: Any) -> Any:
+    """Transform a start or a goal, or None, from the map's frame to the world's."""
+    return tuple(map_to_world(frame, [end])[0].tolist()) if end is not None and any(frame) else end
 
 
 def tidy(value: float) -> float:

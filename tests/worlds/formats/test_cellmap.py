@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from antdrive.worlds import CellMap, Disc, World, cell_map, map_task, rasterise
-from antdrive.worlds.formats.cellmap import conversion_progress, cover
+from antdrive.worlds.formats.cellmap import conversion_progress, cover, largest_ground
 from tests.worlds.oracles import worlds
 
 CORNER = (math.sqrt(2) - 1) / 2
@@ -194,3 +194,8 @@ def test_a_conversion_says_how_far_it_is():
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     assert len(shares) == 3
+
+
+def test_usual_ends_keep_away_from_the_edge_of_a_map():
+    start, goal = largest_ground(CellMap(np.ones((9, 9), dtype=bool), 1.0), 2)
+    assert (start[:2], goal) == ((2.5, 2.5), (6.5, 6.5))

@@ -89,7 +89,7 @@ def test_a_problem_comes_from_the_only_scen_file_of_the_maps_name(tmp_path):
         (tmp_path / name).write_text(f"version 1\n{PROBLEM}\n\n{blocked}\n")
     with pytest.raises(FieldError, match=r"scen: choose one of made-even-1\.scen, made-random-1\.scen"):
         import_movingai_task(path, problem=1)
-    place = r"made-even-1\.scen:4: the goal x = 1, y = 0 is on a blocked cell of made\.map"
+    place = r"made-even-1\.scen: problem 1: the goal x = 1, y = 0 is on a blocked cell of made\.map"
     with pytest.raises(InputError, match=place):
         import_movingai_task(path, problem=1, scen=tmp_path / "made-even-1.scen")
     (tmp_path / "made-random-1.scen").unlink()

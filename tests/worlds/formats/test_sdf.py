@@ -197,10 +197,21 @@ BAD_XML = {
 def test_without_bounds_the_robot_gets_room_around_the_cylinders(tmp_path):
     task = import_sdf(world(tmp_path, cylinder("a", "0 0 0.5 0 0 0"), cylinder("b", "4 2 0.5 0 0 0")))
     assert task.world.bounds == (-1.5, -1.5, 5.5, 3.5)
-    assert task.start == pytest.approx((-1.0, -1.0, math.atan2(4, 6)))
-    assert task.goal == (5.0, 3.0)
+    assert math.dist(task.start[:2], task.goal) > 4.0
     assert task.world.name == "made"
     assert (point_clearance(task.world, [task.start[:2], task.goal]) >= 0.5).all()
+
+
+def test_the_usual_ends_are_inside_of_walls_that_enclose_more_than_the_ground_around_them(tmp_path):
+    sides = [(x, y, 0.5, 0, 0, yaw) for x, y, yaw in ((0, 5, 0), (0, -5, 0), (5, 0, 1.5708), (-5, 0, 1.5708))]
+    pose = [" ".join(map(str, side)) for side in sides]
+    walls = [
+        shape("box", "<size>10.2 0.2 1</size>", f"w{i}").replace("<link", f"<pose>{p}</pose><link")
+        for i, p in enumerate(pose)
+    ]
+    task = import_sdf(world(tmp_path, *walls))
+    for x, y in (task.start[:2], task.goal):
+        assert max(abs(x), abs(y)) == pytest.approx(4.4, abs=0.2)
 
 
 def test_given_ends_are_inside_the_bounds(tmp_path):

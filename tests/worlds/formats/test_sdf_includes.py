@@ -172,6 +172,12 @@ def test_links_are_relative_to_links_joints_and_the_model(tmp_path):
     assert places(world(tmp_path, model)) == [(11, 0), (12, 0), (12, 1), (10, 3)]
 
 
+def test_a_frame_may_be_attached_to_a_link_that_is_placed_in_it(tmp_path):
+    frame = "<frame name='f' attached_to='l'><pose relative_to='__model__'>3 4 0 0 0 0</pose></frame>"
+    link = f"<link name='l'><pose relative_to='f'>1 0 0.5 0 0 0</pose><collision name='c'>{POST}</collision></link>"
+    assert places(world(tmp_path, f"<model name='m'>{frame}{link}</model>")) == [(4, 4)]
+
+
 def test_a_placement_frame_is_what_the_pose_places(tmp_path):
     frame = "<pose>5 5 0 0 0 0</pose><frame name='corner'><pose>1 0 0 0 0 0</pose></frame>"
     assert places(world(tmp_path, post(frame, attributes="placement_frame='corner'"))) == [(4, 5)]
@@ -265,3 +271,26 @@ def test_trajectories_follow_each_other_after_a_delay(tmp_path):
     text = actor((0, 0, 0), (2, 1, 0), more="<delay_start>3</delay_start>").replace("</script>", f"{second}</script>")
     (mover,) = import_sdf(world(tmp_path, cylinder(pose="5 5 0.5 0 0 0"), text)).world.movers
     assert mover.keyframes == ((3, 0, 0), (5, 1, 0), (6, 2, 0))
+
+
+def test_poses_of_collisions_are_relative_to_their_link_or_to_a_named_frame(tmp_path):
+    def collision(attribute):
+        return f"<collision name='c{attribute}'><pose {attribute}>1 0 0.5 0 0 0</pose>{POST}</collision>"
+
+    parts = "<link name='a'><pose>0 3 0 0 0 0</pose></link><frame name='f'><pose>5 0 0 0 0 0</pose></frame>"
+    link = f"<link name='l'><pose>0 1 0 0 0 0</pose>{collision('')}"
+    named = "".join(collision(f'relative_to="{name}"') for name in ("a", "f", "l", "__model__"))
+    model = f"<model name='m'><pose>10 0 0 0 0 0</pose>{parts}{link}{named}</link></model>"
+    assert places(world(tmp_path, model)) == [(11, 1), (11, 3), (16, 0), (11, 1), (11, 0)]
+
+
+def test_one_of_several_worlds_is_not_taken_in_silence(tmp_path):
+    path = world(tmp_path, cylinder())
+    path.write_text(path.read_text().replace("</sdf>", "<world name='second'/></sdf>"))
+    with pytest.raises(InputError, match=r"has 2 worlds \(default, second\); leave one in it"):
+        import_sdf(path)
+
+
+def test_the_usual_bounds_enclose_the_ways_of_actors(tmp_path):
+    bounds = import_sdf(world(tmp_path, cylinder(), actor((0, 3, 3), (2, 3, 9)))).world.bounds
+    assert bounds == pytest.approx((-1.5, -1.5, 4.3, 10.3))

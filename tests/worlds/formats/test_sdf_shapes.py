@@ -133,7 +133,7 @@ def test_what_is_above_the_band_or_flat_is_no_obstacle_and_said(tmp_path):
     assert made.obstacles == (Disc(3, 3, 0.1),)
     said = made.source.split("; ")
     assert "shapes above 2 m, no obstacles: 2" in said
-    assert "shapes up to 0.01 m, taken for floor: 2" in said
+    assert "shapes up to 0.01 m, taken for floor: 1" in said
     assert "bodies that could move, taken to stand still: 1" in said
     assert len(imported(tmp_path, lamp, post, band=(0.0, 3.0)).obstacles) == 2
 
@@ -223,3 +223,34 @@ def test_a_plain_world_of_cylinders_needs_no_kernels(tmp_path, monkeypatch):
     monkeypatch.setattr(solids, "_rasterised", None)
     can = "<cylinder><radius>0.1</radius><length>1</length></cylinder>"
     assert imported(tmp_path, placed(can, (1, 1, 0.5, 0, 0, 0)), shape("empty")).obstacles == (Disc(1, 1, 0.1),)
+
+
+def plane(z, normal="0 0 1"):
+    return placed(f"<plane><normal>{normal}</normal><size>9 9</size></plane>", (0, 0, z, 0, 0, 0), f"plane{z}")
+
+
+def test_the_highest_ground_plane_is_the_floor(tmp_path):
+    box = placed("<box><size>1 1 1</size></box>", (3, 0, -1.5, 0, 0, 0))
+    low = tmp_path / "low.sdf"
+    low.write_text(f"<sdf><world name='w'>{plane(-2.5)}{plane(-2.0)}{box}</world></sdf>")
+    made = import_sdf(low).world
+    assert "the floor is -2 m high" in made.source
+    assert "shapes between -1.99 and 0 m: 1 box" in made.source
+    assert {d.height for d in made.obstacles} == {1.0}
+    assert import_sdf(low, band=(-1.99, 0)).world.obstacles[0].height == pytest.approx(0.99)
+
+
+@pytest.mark.parametrize(
+    ("odd", "why"), [(plane(1.0), "1 m above the floor"), (plane(0.0, "0 0 -1"), "does not face up")]
+)
+def test_planes_that_are_no_floor_are_refused(odd, why, tmp_path):
+    with pytest.raises(ValueError, match=why):
+        imported(tmp_path, placed("<box><size>1 1 0.5</size></box>", (3, 0, 0.25, 0, 0, 0)), odd)
+
+
+def test_a_stage_on_the_ground_is_an_obstacle(tmp_path):
+    stage = placed("<box><size>6 4 0.25</size></box>", (0, 0, 0.125, 0, 0, 0))
+    post = placed("<box><size>0.2 0.2 1</size></box>", (5, 2.4, 0.5, 0, 0, 0), "post")
+    made = imported(tmp_path, stage, post)
+    assert "the floor is" not in made.source
+    assert gaps(made, np.array([[2.9, 0.0]])) < 0

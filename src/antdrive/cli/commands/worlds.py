@@ -172,10 +172,7 @@ def _coverage_rows(covered: "Mapping[str, Coverage]", least: float) -> "Iterator
     if len(listed) > MOST_DOORS:
         yield "", f"and {len(listed) - MOST_DOORS} more"
     if len(shut) > len(listed):
-        yield (
-            "no doors",
-            f"{len(shut) - len(listed)} gaps narrower than {least:.2f} m, half of what the robot needs",
-        )
+        yield "no doors", f"{len(shut) - len(listed)} gaps narrower than {least:.2f} m, half of what the robot needs"
 
 
 @options.with_settings(("seed",))
@@ -207,18 +204,13 @@ def import_world(
         Path, argument("FILE", "Gazebo SDF (.sdf, .world), map_server (.yaml), MovingAI (.map) or DynaBARN (.json).")
     ],
     out: Annotated[
-        Path | None,
-        option(
-            "FILE",
-            "World file to write (DynaBARN: folder).  [default: FILE's name]",
-        ),
+        Path | None, option("FILE", "World file to write (DynaBARN: folder).  [default: FILE's name]")
     ] = None,
     barn: Annotated[bool, flag("SDF: start and goal of the BARN Challenge.", "--barn")] = False,
     start: Annotated[str | None, option("X,Y,YAW", "Start pose [m, m, rad]; maps contain none.")] = None,
     goal: Annotated[str | None, option("X,Y", "Goal [m]; maps contain none.")] = None,
     bounds: Annotated[
-        str | None,
-        option("BOUNDS", "SDF: walls at XMIN,YMIN,XMAX,YMAX [m].  [default: 1 m around the obstacles]"),
+        str | None, option("BOUNDS", "SDF: walls at XMIN,YMIN,XMAX,YMAX [m].  [default: 1 m around the obstacles]")
     ] = None,
     skip_unsupported: Annotated[
         bool, flag("SDF: skip missing models and unsupported parts.", "--skip-unsupported")
@@ -243,8 +235,7 @@ def import_world(
         float | None, option("METRES", "MovingAI, SDF: cell size [m].  [default: 1; SDF: 0.02]", min=1e-6, max=1e6)
     ] = None,
     problem: Annotated[
-        int | None,
-        option("NUMBER", "MovingAI: start and goal of this problem in the .scen file, from 0.", min=0),
+        int | None, option("NUMBER", "MovingAI: start and goal of this problem in the .scen file, from 0.", min=0)
     ] = None,
     scen: Annotated[
         Path | None, option("FILE", "MovingAI: the .scen file.  [default: FILE.scen, or the only one of FILE's name]")
@@ -326,8 +317,7 @@ def export_world(
     world: options.World,
     out: Annotated[Path, option("FILE", "Gazebo: .sdf, .world; map_server: .yaml; MovingAI: .map.")],
     resolution: Annotated[
-        float | None,
-        option("METRES", "Maps: cell size [m].  [default: the world's]", min=1e-6, max=1e6),
+        float | None, option("METRES", "Maps: cell size [m].  [default: the world's]", min=1e-6, max=1e6)
     ] = None,
     force: Annotated[bool, flag("Replace existing files, including .pgm and .scen.", "--force")] = False,
     json: options.Json = False,

@@ -161,50 +161,21 @@ def greedy_cover(needed: Array, distance2: Array, extra: float, chosen: Array) -
 
 
 @kernel
-def between(points: Array, count: int, axis: int, low: float, high: float, out: Array) -> int:
-    """Fill `out` with points whose hull is the part of the hull of `points` between two coordinates; return their number.
+def points_between(points: Array, low: float, high: float, out: Array) -> int:
+    """Fill `out` with points whose hull is the part of the hull of `points` between two heights; return their number.
 
     All pairs of points count as edges: those that are none lie inside of the hull.
     """
     found = 0
-    for a in range(count):
-        if low <= points[a, axis] <= high:
+    for a in range(len(points)):
+        if low <= points[a, 2] <= high:
             out[found], found = points[a], found + 1
         for b in range(a):
-            first, step = points[a, axis], points[b, axis] - points[a, axis]
+            first, step = points[a, 2], points[b, 2] - points[a, 2]
             for limit in (low, high):
                 if (first < limit < first + step) or (first + step < limit < first):
-                    out[found] = points[a] + (limit - first) / step * (points[b] - points[a])
-                    out[found, axis] = limit
-                    found += 1
+                    out[found], found = points[a] + (limit - first) / step * (points[b] - points[a]), found + 1
     return found
-
-
-@kernel
-def corners_of(points: Array, count: int, out: Array) -> int:
-    """Fill `out` with the corners of the hull of `points` over the floor, and return their number (Andrew 1979).
-
-    The points are sorted in place.
-    """
-    for i in range(1, count):
-        j = i
-        while j and (points[j, 0], points[j, 1]) < (points[j - 1, 0], points[j - 1, 1]):
-            for k in range(3):
-                points[j, k], points[j - 1, k] = points[j - 1, k], points[j, k]
-            j -= 1
-    found = 0
-    for side in range(2):
-        begin = found
-        for i in range(count):
-            p = points[i] if side == 0 else points[count - 1 - i]
-            while found >= begin + 2:
-                a, b = out[found - 2], out[found - 1]
-                if (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) > 0.0:
-                    break
-                found -= 1
-            out[found], found = p, found + 1
-        found -= 1
-    return max(found, 1)
 
 
 @kernel
@@ -212,24 +183,33 @@ def mark_pieces(pieces: Array, low: float, high: float, corner: Array, cell: flo
     """Raise tops[r, c] to the top of each convex piece that reaches into the cell between two heights.
 
     Pieces are given by points whose hull they are, (K, V, 3) with V <= 8; the part of a piece over a row of cells covers the
-    columns from its least to its greatest x.
+    columns from its least to its greatest x. All pairs of points count as edges.
     """
     rows, cols = tops.shape
-    band, hull, strip = np.empty((64, 3)), np.empty((65, 3)), np.empty((4096, 3))
+    points, ends = np.empty((64, 3)), np.empty((rows, 2))
     for k in range(len(pieces)):
-        count = between(pieces[k], pieces.shape[1], 2, low, high, band)
+        count = points_between(pieces[k], low, high, points)
         if not count:
             continue
-        top = pieces[k, :, 2].max()
-        count = corners_of(band, count, hull)
-        first = (hull[:count, 1].min() + slack - corner[1]) / cell
-        last = max(first, (hull[:count, 1].max() - slack - corner[1]) / cell)
-        for r in range(int(math.floor(max(first, 0.0))), int(math.floor(min(last, rows - 1.0))) + 1):
-            bottom = corner[1] + r * cell
-            n = between(hull, count, 1, bottom - slack, bottom + cell + slack, strip)
-            if not n:
+        x, y, top = points[:count, 0] - corner[0], points[:count, 1] - corner[1], pieces[k, :, 2].max()
+        lowest = (y.min() + slack) / cell
+        begin = int(max(math.floor(lowest), 0.0))
+        stop = int(min(math.floor(max(lowest, (y.max() - slack) / cell)) + 1.0, rows))
+        ends[begin:stop, 0], ends[begin:stop, 1] = np.inf, -np.inf
+        for a in range(count):
+            for b in range(a + 1):
+                i, j = (a, b) if y[a] <= y[b] else (b, a)
+                slope = (x[j] - x[i]) / (y[j] - y[i]) if y[j] - y[i] > slack else 0.0
+                first, last = math.floor((y[i] - slack) / cell), math.floor((y[j] + slack) / cell)
+                for r in range(int(max(first, begin)), int(min(last + 1.0, stop))):
+                    from_y, to_y = max(y[i], r * cell - slack), min(y[j], (r + 1) * cell + slack)
+                    one, two = x[i] + slope * (from_y - y[i]), x[j] - slope * (y[j] - to_y)
+                    if from_y <= to_y:
+                        ends[r, 0], ends[r, 1] = min(ends[r, 0], one, two), max(ends[r, 1], one, two)
+        for r in range(begin, stop):
+            if ends[r, 0] > ends[r, 1]:
                 continue
-            left = (strip[:n, 0].min() + slack - corner[0]) / cell
-            right = max(left, (strip[:n, 0].max() - slack - corner[0]) / cell)
-            for c in range(int(math.floor(max(left, 0.0))), int(math.floor(min(right, cols - 1.0))) + 1):
+            left = (ends[r, 0] + slack) / cell
+            right = max(left, (ends[r, 1] - slack) / cell)
+            for c in range(int(max(math.floor(left), 0.0)), int(min(math.floor(right) + 1.0, cols))):
                 tops[r, c] = max(tops[r, c], top)

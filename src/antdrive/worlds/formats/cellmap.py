@@ -48,15 +48,6 @@ def conversion_progress(report: Callable[[float], None]) -> Iterator[None]:
         _report.reset(token)
 
 
-@contextmanager
-def progress_part(number: int, count: int) -> Iterator[None]:
-    """Count what happens within the context as one of several parts of a conversion."""
-    report = _report.get()
-    with conversion_progress(lambda fraction: None):
-        yield
-    report((number + 1) / count)
-
-
 @dataclass(frozen=True, eq=False)
 class CellMap:
     """A map of free and blocked square cells; everything beyond it is blocked.
@@ -167,25 +158,29 @@ def cover(cells: CellMap, overhang: float | None = None, needed: Cells | None = 
     if free.size > MAX_COVERED:
         rows, cols = free.shape
         raise input_error("map", f"has {rows} x {cols} reachable cells; the limit is {MAX_COVERED}")
-    _report.get()(REACHABLE_DONE)
+    report = _report.get() if needed is None else lambda fraction: None  # of a part, nothing is reported
+    report(REACHABLE_DONE)
     needed = _beside(free) & ~free if needed is None else needed
     # Treat the map as surrounded by free cells, so that no disc reaches beyond it.
     distance2 = np.empty((2 * free.shape[0] + 5, 2 * free.shape[1] + 5), dtype=np.int32)
     kernels.squared_distances(np.pad(free, 1, constant_values=True), CAP, distance2)
     distance2 = np.ascontiguousarray(distance2[2:-2, 2:-2])
-    _report.get()(DISTANCES_DONE)
+    report(DISTANCES_DONE)
     chosen = np.empty((int(needed.sum()), 4), dtype=np.int64)
     extra = 2 * (CORNER if overhang is None else max(CORNER, overhang / cell))
     i, j, radius2, inside2 = chosen[: kernels.greedy_cover(needed, distance2, extra, chosen)].T
     radius, (x0, y0) = np.sqrt(radius2) / 2, cells.origin
-    _report.get()(1.0)
+    report(1.0)
     discs = np.column_stack([x0 + j * (cell / 2), y0 + i * (cell / 2), radius * cell + SLACK])
     out = float((radius - np.sqrt(inside2) / 2).max(initial=0.0)) * cell
     return Cover(discs, int(needed.sum()), out)
 
 
-def cover_inside(blocked: Cells, cell: float, corner: Point, overhang: float) -> Cover:
-    """Cover all of the given blocked cells (R, C), their insides with large discs that reach nowhere beyond."""
+def cover_inside(blocked: Cells, cell: float, corner: Point, overhang: float, done: float) -> Cover:
+    """Cover all of the given blocked cells (R, C), their insides with large discs that reach nowhere beyond.
+
+    Then the fraction `done` of a conversion is reported.
+    """
     rows, cols = blocked.shape
     padded = np.pad(blocked, ((0, -rows % COARSE), (0, -cols % COARSE)))
     coarse = np.pad(padded.reshape(padded.shape[0] // COARSE, COARSE, -1, COARSE).all(axis=(1, 3)), 1)
@@ -193,6 +188,7 @@ def cover_inside(blocked: Cells, cell: float, corner: Point, overhang: float) ->
     inner = cover(CellMap(~deep, cell * COARSE, corner), needed=deep)
     rim = blocked & ~deep.repeat(COARSE, 0).repeat(COARSE, 1)[:rows, :cols]
     outer = cover(CellMap(~blocked, cell, corner), overhang, rim)
+    _report.get()(done)
     return Cover(np.vstack([inner.discs, outer.discs]), int(blocked.sum()), outer.overhang)
 
 
@@ -297,8 +293,8 @@ def connected(free: Cells, ends: Iterable[tuple[int, int]]) -> Cells:
     return reached
 
 
-def largest_ground(cells: CellMap) -> tuple[Pose, Point]:
-    """Return a start and a goal on the largest connected part of a map, far from blocked cells.
+def largest_ground(cells: CellMap, most: int = MOST_EROSIONS) -> tuple[Pose, Point]:
+    """Return a start and a goal on the largest connected part of a map, up to `most` cells away from blocked ones.
 
     Raises:
         InputError: no two free cells are connected.
@@ -311,8 +307,8 @@ def largest_ground(cells: CellMap) -> tuple[Pose, Point]:
         largest = max(largest, part, key=np.count_nonzero)
     if np.count_nonzero(largest) < 2:
         raise input_error("map", "has no two connected free cells")
-    for _ in range(MOST_EROSIONS):
-        inner = largest & ~_beside(~largest)
+    for _ in range(most):
+        inner = ~_beside(~np.pad(largest, 1))[1:-1, 1:-1]
         if np.count_nonzero(inner) < 2:
             break
         largest = inner

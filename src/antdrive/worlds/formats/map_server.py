@@ -30,7 +30,7 @@ from antdrive.base.checks import OneLine, check, yaml_number
 from antdrive.base.document import read_document
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.files import open_regular, require_new
-from antdrive.base.plane import map_to_world, world_to_map
+from antdrive.base.plane import end_in_world, world_to_map
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats, Point, Pose
 from antdrive.worlds.files.world_file import Goal, Start, Triple, require_no_movers
@@ -147,8 +147,7 @@ def import_map_server(
     source = f"the map_server map {file.name}"
     if served.unknown:
         source += f" with {served.unknown} unknown cells taken for {'free' if unknown_is_free else 'blocked'}"
-    if any(served.frame):
-        start, goal = _map_to_world(served.frame, start), _map_to_world(served.frame, goal)
+    start, goal = end_in_world(served.frame, start), end_in_world(served.frame, goal)
     task = file_task(
         file,
         served.cells,
@@ -170,16 +169,12 @@ def kept_tasks(path: str | os.PathLike[str], task: Task) -> dict[str, Task]:
     entry = check(MapFile, document)
     tasks = {}
     for i, kept in enumerate(entry.antdrive.tasks if entry.antdrive else ()):
-        start, goal = _map_to_world(task.frame, kept.start), _map_to_world(task.frame, kept.goal)
+        start, goal = end_in_world(task.frame, kept.start), end_in_world(task.frame, kept.goal)
         try:
             tasks[kept.name] = dataclasses.replace(task, start=start, goal=goal, goal_tolerance=kept.goal_tolerance)
         except FieldError as error:
             raise document.field_error(error, "antdrive", "tasks", i) from None
     return tasks
-
-
-def _map_to_world(frame: Pose, end: Any) -> Any:
-    return None if end is None else tuple(map_to_world(frame, [end])[0].tolist())
 
 
 def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool | None = None) -> ServedMap:

@@ -107,14 +107,17 @@ def import_movingai_task(
     if problem is not None:
         if start is not None or goal is not None:
             raise input_error("problem", "has its own start and goal; give either the problem or start and goal")
-        place, chosen = _problem_of(_scen_of(file) if scen is None else Path(scen), problem)
+        scen = _scen_of(file) if scen is None else Path(scen)
+        problems = import_movingai_problems(scen)
+        if not 0 <= problem < len(problems):
+            raise input_error(str(scen), f"has the problems 0 to {len(problems) - 1}, got {problem}")
+        chosen = problems[problem]
         (r0, c0), (r1, c1) = chosen.start, chosen.goal
         for key, (r, c) in (("start", chosen.start), ("goal", chosen.goal)):
             if r < len(cells.free) and c < cells.free.shape[1] and not cells.free[r, c]:
                 at = f"x = {c}, y = {len(cells.free) - 1 - r}"
-                raise input_error(
-                    place, f"the {key} {at} is on a blocked cell of {file.name}; y counts from its first line"
-                )
+                why = f"the {key} {at} is on a blocked cell of {file.name}; y counts from its first line"
+                raise input_error(f"{scen}: problem {problem}", why)
         start = (c0 + 0.5) * resolution, (r0 + 0.5) * resolution, math.atan2(r1 - r0, c1 - c0)
         goal = (c1 + 0.5) * resolution, (r1 + 0.5) * resolution
         source += f", problem {problem} of optimal length {chosen.printed} on its cells"
@@ -139,14 +142,6 @@ def _scen_of(file: Path) -> Path:
         names = ", ".join(other.name for other in others[:MOST_NAMES]) + (" and more" if others[MOST_NAMES:] else "")
         raise FieldError("scen", f"choose one of {names}")
     return others[0] if others else usual
-
-
-def _problem_of(scen: Path, number: int) -> tuple[str, MapProblem]:
-    """Return one problem of a `.scen` file, with its place for messages."""
-    problems = _numbered_problems(scen)
-    if not 0 <= number < len(problems):
-        raise input_error(str(scen), f"has the problems 0 to {len(problems) - 1}, got {number}")
-    return problems[number]
 
 
 def _read_cells(path: str | os.PathLike[str]) -> npt.NDArray[np.bool_]:
@@ -207,17 +202,11 @@ def import_movingai_problems(path: str | os.PathLike[str]) -> list[MapProblem]:
     Raises:
         InputError: the file is unreadable or not a list of problems.
     """
-    return [problem for _, problem in _numbered_problems(path)]
-
-
-def _numbered_problems(path: str | os.PathLike[str]) -> list[tuple[str, MapProblem]]:
-    """Return the problems of a `.scen` file, each with its file and line."""
     source, lines = _read_lines(path)
     head = lines[0].decode("ascii", "replace").split() if lines else []
     if len(head) != 2 or head[0] != "version" or head[1] not in ("1", "1.0"):
         raise input_error(f"{source}:1", f"must be `version 1`, got {_quote(lines[0] if lines else b'')}")
-    numbered = ((f"{source}:{number}", line) for number, line in enumerate(lines[1:], 2) if line.strip())
-    return [(place, _problem(place, line)) for place, line in numbered]
+    return [_problem(f"{source}:{number}", line) for number, line in enumerate(lines[1:], 2) if line.strip()]
 
 
 def _problem(place: str, line: bytes) -> MapProblem:

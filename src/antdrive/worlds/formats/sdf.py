@@ -13,9 +13,10 @@ from xml.sax.saxutils import quoteattr
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.plane import map_to_world
+from antdrive.base.plane import end_in_world
 from antdrive.base.types import Bounds, Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
+from antdrive.worlds.formats.cellmap import cell_map, largest_ground
 from antdrive.worlds.formats.sdf_models import ACTOR_RADIUS, VARIABLES, Models, SdfReader
 from antdrive.worlds.formats.solids import BAND, cover_pieces, floor_height
 from antdrive.worlds.formats.xml import parse_xml
@@ -58,12 +59,13 @@ def import_sdf(
 
     Args:
         path: the SDF file
-        start: the robot's start pose in the file's coordinates [m, m, rad]; by default at the lower left, towards the goal
-        goal: the goal position in the file's coordinates [m]; by default at the upper right
+        start: the robot's start pose in the file's coordinates [m, m, rad]; by default on the largest connected ground
+        goal: the goal position in the file's coordinates [m]; by default there, too
         bounds: the walls' inner faces, in the world's own frame [m]; by default 1 m around the obstacles, start and goal
         cell: the task's grid resolution [m]; by default 0.25, or 0.1 with covered shapes
         goal_tolerance: largest distance from the goal at the stop [m]; by default 0.25
-        band: heights between which shapes are obstacles [m]; by default 0.01 and 2 above the floor
+        band: heights in the file between which shapes are obstacles [m]; by default 0.01 and 2 above the floor, which is
+            the highest ground plane, or the top of low plates that cover most of the ground
         resolution: side of the cells on which shapes are covered [m]; by default 0.02, or more in large worlds
         overhang: largest protrusion of cylinders beyond these cells [m]; by default their side
         skip_unsupported: skip unsupported parts and missing models instead of refusing the file
@@ -76,15 +78,17 @@ def import_sdf(
     world = _world_element(file)
     kept = _KeptTask.take(file, world)
     frame = kept.numbers("frame", 3) or (0.0, 0.0, 0.0)
-    if band is not None and not 0 <= band[0] < band[1]:
-        raise FieldError("band", f"must be two heights, LOW,HIGH with 0 <= LOW < HIGH, got {band[0]:g},{band[1]:g}")
-    known = (float(band[0]), float(band[1])) if band else (0.0, math.inf) if kept.values else None
+    if band is not None and not band[0] < band[1]:
+        raise FieldError("band", f"must be two heights, LOW,HIGH with LOW < HIGH, got {band[0]:g},{band[1]:g}")
+    low, high = band or ((0.0, math.inf) if kept.values else BAND)
+    floor = min(float(low), 0.0)
     try:
         reader = SdfReader(file)
-        models = reader.read(world, frame, known or BAND)
-        if known is None and (floor := floor_height(models.solids)):
-            above = reader.read(world, frame, (BAND[0] + floor, BAND[1] + floor), floor)
-            models = above if above.kinds else models
+        models = reader.read(world, frame, (low - floor, high - floor), floor)
+        for plates in (False, True) if band is None and not kept.values else ():
+            if rise := floor_height(models.solids) if plates else max(models.planes, default=0.0):
+                above = reader.read(world, frame, BAND, models.floor + rise)
+                models = above if above.kinds else models
         if (models.unsupported or models.missing) and not skip_unsupported:
             raise InputError(_about_unsupported(models))
         covering, reach = cover_pieces(models.solids, models.band, resolution, overhang)
@@ -93,47 +97,35 @@ def import_sdf(
     if on_skipped is not None:
         on_skipped([*models.unsupported, *(f"{uri} (not found)" for uri in models.missing)])
     discs = [*models.discs, *covering]
-    start = _in_world(frame, start) or kept.numbers("start", 3)
-    goal = _in_world(frame, goal) or kept.numbers("goal", 2)
+    start = end_in_world(frame, start) or kept.numbers("start", 3)
+    goal = end_in_world(frame, goal) or kept.numbers("goal", 2)
     bounds = bounds or kept.numbers("bounds", 4)
     if bounds is None:
-        bounds = _bounds_around(file, discs, start, goal)
-    goal = goal or (bounds[2] - MARGIN / 2, bounds[3] - MARGIN / 2)
-    if start is None:
-        x, y = bounds[0] + MARGIN / 2, bounds[1] + MARGIN / 2
-        start = x, y, math.atan2(goal[1] - y, goal[0] - x)
+        bounds = _bounds_around(file, models, discs, start, goal)
+    cell = kept.number("cell", _cell(bounds, FINE if covering else CELL)) if cell is None else cell
+    tolerance = kept.number("goal_tolerance", TOLERANCE) if goal_tolerance is None else goal_tolerance
     about = "; ".join([f"imported from {file.name}", *_about(models, len(covering), reach)])
+    source = kept.values.get("source") if kept.values else about
     try:
-        return Task(
-            World(
-                kept.text("name", file.stem),
-                bounds,
-                tuple(discs),
-                kept.values.get("source") if kept.values else about,
-                tuple(models.movers),
-            ),
-            start,
-            goal,
-            kept.number("goal_tolerance", TOLERANCE) if goal_tolerance is None else goal_tolerance,
-            kept.number("cell", _cell(bounds, FINE if covering else CELL)) if cell is None else cell,
-            kept.number("time_limit", None),
-            frame=frame,
-        )
-    except FieldError as error:
+        made = World(kept.values.get("name", file.stem), bounds, tuple(discs), source, tuple(models.movers))
+        if start is None or goal is None:
+            ground = cell_map(made, _cell(bounds, FINE))
+            usual_start, usual_goal = largest_ground(ground, math.ceil(MARGIN / 2 / ground.resolution))
+            start, goal = start or usual_start, goal or usual_goal
+        return Task(made, start, goal, tolerance, cell, kept.number("time_limit", None), frame=frame)
+    except (FieldError, InputError) as error:
         raise input_error(str(file), str(error)) from None
 
 
 def _about(models: Models, covering: int, reach: float) -> Iterator[str]:
     """Yield what was imported, assumed and ignored."""
-    low, high = models.band
+    low, high = (height + models.floor for height in models.band)
     if models.floor:
-        yield f"the floor is {models.floor:g} m high: low plates cover most of the ground"
+        yield f"the floor is {models.floor:g} m high: a ground plane, or low plates, whose edges are open"
     if covering:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(models.kinds.items()))
-        yield (
-            f"the shapes between {low:g} and {high:g} m ({kinds}) are fully covered; {covering} of the cylinders "
-            f"cover what is not upright and round, and reach at most {reach + models.facets:.3g} m beyond it"
-        )
+        yield f"shapes between {low:g} and {high:g} m: {kinds}"
+        yield f"cylinders cover them fully, and reach at most {reach + models.facets:.3g} m beyond them"
     if models.sloping > MOST_SLOPING:
         yield f"sloping ground, taken for obstacles: {models.sloping:.0f} m2"
     if models.movers:
@@ -143,11 +135,6 @@ def _about(models: Models, covering: int, reach: float) -> Iterator[str]:
         yield what if what.startswith("left out") else f"{names.get(what, what)}: {count}"
 
 
-def _in_world(frame: Pose, end: Any) -> Any:
-    """Transform a start or a goal from the file's coordinates to the world's frame."""
-    return tuple(map_to_world(frame, [end])[0].tolist()) if end is not None and any(frame) else end
-
-
 def _world_element(file: Path) -> ET.Element:
     root = parse_xml(file)
     if any(element.tag.startswith("xacro:") for element in root.iter()):
@@ -155,6 +142,8 @@ def _world_element(file: Path) -> ET.Element:
     world = root.find("world") if root.tag == "sdf" else None
     if world is None and (root.tag != "sdf" or root.find("model") is None):
         raise input_error(str(file), f"must be an <sdf> with a <world> or a <model> in it, got <{root.tag}>")
+    if len(worlds := [each.get("name", "") for each in root.findall("world")]) > 1:
+        raise input_error(str(file), f"has {len(worlds)} worlds ({', '.join(worlds)}); leave one in it")
     return root if world is None else world
 
 
@@ -175,9 +164,6 @@ class _KeptTask:
             world.remove(model)
         return cls(file, dict(element.attrib))
 
-    def text(self, key: str, default: str) -> str:
-        return self.values.get(key, default)
-
     def numbers(self, key: str, count: int) -> Any:
         """Return the numbers under a key as a tuple; None without the key."""
         if key not in self.values:
@@ -193,33 +179,31 @@ class _KeptTask:
 
     def number(self, key: str, default: Any) -> Any:
         """Return the number under a key."""
-        (number,) = self.numbers(key, 1) or (default,)
-        return number
+        return (self.numbers(key, 1) or (default,))[0]
 
 
 def _about_unsupported(models: Models) -> str:
     """Return in one line what of a world cannot be imported, and what helps."""
-    problems = []
-    if models.missing:
-        folders = f"name their folder in {VARIABLES[0]} (or {', '.join(VARIABLES[1:])})"
-        fuel = (
-            "; download Fuel's with: gz fuel download -u URL" if any("://fuel" in uri for uri in models.missing) else ""
-        )
-        problems.append(
-            f"models and meshes not found ({len(models.missing)}): {', '.join(models.missing)}; {folders}{fuel}"
-        )
-    if models.unsupported:
-        more = len(models.unsupported) - 5
-        names = ", ".join(models.unsupported[:5]) + (f" and {more} more" if more > 0 else "")
-        problems.append(f"parts that cannot be imported ({len(models.unsupported)}): {names}")
+    problems, missing, parts = [], models.missing, models.unsupported
+    if missing:
+        problems.append(f"models and meshes not found ({len(missing)}): {', '.join(missing)}")
+        problems.append(f"name their folder in {VARIABLES[0]} (or {', '.join(VARIABLES[1:])})")
+    if any("://fuel" in uri for uri in missing):
+        problems.append("download Fuel's with: gz fuel download -u URL")
+    if parts:
+        names = ", ".join(parts[:5]) + (f" and {len(parts) - 5} more" if parts[5:] else "")
+        problems.append(f"parts that cannot be imported ({len(parts)}): {names}")
     return "; ".join([*problems, "--skip-unsupported leaves them out"])
 
 
-def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
-    """Return bounds `MARGIN` around the obstacles, start and goal; raise InputError without obstacles."""
-    if not discs:
-        raise input_error(str(file), "has no obstacles between the floor and the robot's height; give the bounds")
+def _bounds_around(file: Path, models: Models, discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
+    """Return bounds `MARGIN` around the obstacles, movers, start and goal; raise InputError without obstacles."""
     spots = [(d.x, d.y, d.radius) for d in discs]
+    spots += [(x, y, ACTOR_RADIUS) for mover in models.movers for _, x, y in mover.keyframes]
+    if not spots:
+        low, high = (height + models.floor for height in models.band)
+        why = "; ".join([f"has no obstacles between {low:g} and {high:g} m", *_about(models, 0, 0.0)])
+        raise input_error(str(file), f"{why}; choose other heights with --band, or give --bounds for an empty world")
     spots += [(end[0], end[1], 0.0) for end in (start, goal) if end is not None]
     return (
         min(x - r for x, _, r in spots) - MARGIN,

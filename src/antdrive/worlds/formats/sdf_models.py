@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import os
@@ -20,7 +21,7 @@ from antdrive.base.plane import format_point
 from antdrive.base.ros import folders_in, ros_package
 from antdrive.base.types import Floats, Pose
 from antdrive.worlds.formats.meshes import read_mesh
-from antdrive.worlds.formats.solids import FACETS, ROUND, Unsupported, numbers, solid
+from antdrive.worlds.formats.solids import BAND, FACETS, ROUND, Unsupported, numbers, solid
 from antdrive.worlds.formats.xml import parse_xml, rotation_matrix
 from antdrive.worlds.movers import Keyframed, Loop
 from antdrive.worlds.world import Disc
@@ -29,7 +30,7 @@ from antdrive.worlds.world import Disc
 VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "SDF_PATH", "GAZEBO_MODEL_PATH")
 FUEL_FOLDERS = ("~/.gz/fuel", "~/.ignition/fuel")  # Fuel's downloads
 CLASSIC_FOLDER = "~/.gazebo/models"  # downloads of Gazebo classic
-USUAL = re.compile(r"(sun|ground[ _]?plane)(/\d+)?/?$", re.IGNORECASE)  # floor and light, under any address
+USUAL = re.compile(r"(^|/)(sun|ground[ _]?plane)(/\d+)?/?$", re.IGNORECASE)  # floor and light, under any address
 DRIVES = re.compile(
     r"diff_?-?drive|skid_?-?steer|ackermann|mecanum|omni|planar_?move|tracked-?vehicle|velocity-?control|multicopter",
     re.IGNORECASE,
@@ -37,6 +38,7 @@ DRIVES = re.compile(
 ACTOR_RADIUS, ACTOR_HEIGHT = 0.3, 1.8  # of an actor, which has no collision shape [m]
 STEEP, FLAT = math.cos(math.radians(45)), math.cos(math.radians(1))  # of the slopes of ground
 MAX_MODELS = 20_000  # with those of included files
+ORIGIN = np.eye(4)  # the pose of a frame in itself
 MAX_NESTING = 50  # of models, and of frames that refer to each other
 
 
@@ -48,12 +50,13 @@ class _Missing(Unsupported):
 class Models:
     """The contents of a world between two heights."""
 
-    band: tuple[float, float]  # the heights [m]
-    floor: float = 0.0  # assumed height of the floor [m]
+    band: tuple[float, float]  # the heights above the floor [m]
+    floor: float = 0.0  # height of the floor in the file [m]
     discs: list[Disc] = field(default_factory=list)  # upright cylinders and spheres
     solids: list[Floats] = field(default_factory=list)  # convex pieces of all other shapes, (K, V, 3)
     facets: float = 0.0  # largest distance of pieces and discs beyond round shapes [m]
     sloping: float = 0.0  # area of imported meshes' surfaces that are neither flat nor steep [m2]
+    planes: list[float] = field(default_factory=list)  # heights of ground planes above the floor [m]
     movers: list[Keyframed] = field(default_factory=list)
     kinds: Counter[str] = field(default_factory=Counter)  # number of imported shapes by kind
     counts: Counter[str] = field(default_factory=Counter)  # of what is assumed or ignored
@@ -83,12 +86,11 @@ class _Scope:
         }
         self._open: set[str] = set()
 
-    def place(self, element: ET.Element, base: str = "") -> Floats:
-        """Return the pose (4, 4) of an element, by default relative to the frame `base`."""
+    def place(self, element: ET.Element, base: str | Floats = "") -> Floats:
+        """Return the pose (4, 4) of an element, by default relative to a frame or a pose `base`."""
         pose = element.find("pose")
-        if pose is None:
-            return self.frame(base)
-        return self.frame(pose.get("relative_to") or pose.get("frame") or base) @ read_pose(pose)
+        base = (None if pose is None else pose.get("relative_to") or pose.get("frame")) or base
+        return (self.frame(base) if isinstance(base, str) else base) @ read_pose(pose)
 
     def of_body(self, body: _SdfModel) -> Floats:
         """Return the pose (4, 4) of a model."""
@@ -99,7 +101,7 @@ class _Scope:
     def frame(self, name: str) -> Floats:
         """Return the pose (4, 4) of a frame."""
         if name in ("", "__model__", "world", "__root__"):
-            return np.eye(4)
+            return ORIGIN
         if name in self._open or len(self._open) > MAX_NESTING:
             raise Unsupported(f"frame {name!r} refers to itself")
         first, _, rest = name.partition("::")
@@ -117,20 +119,16 @@ class _Scope:
             self._open.remove(name)
 
 
+@dataclass(frozen=True, eq=False)
 class _Wanted:
-    """A transform from a <world>'s frame to another frame."""
+    """A transform from a <world>'s frame to another frame, of the given pose (4, 4) in it."""
 
-    def __init__(self, frame: Pose) -> None:
-        x, y, yaw = frame
-        self._same = not any(frame)
-        self._frame = _matrix(x, y, 0.0, 0.0, 0.0, yaw)
-        self._back = np.linalg.inv(self._frame)
+    frame: Floats
 
     def __matmul__(self, pose: Floats) -> Floats:
         """Transform a pose (4, 4). The frame's own pose becomes the exact identity."""
-        if self._same:
-            return pose
-        return np.eye(4) if np.array_equal(pose, self._frame) else np.asarray(self._back @ pose)
+        same = np.array_equal(pose, self.frame)
+        return ORIGIN if same else np.asarray(np.linalg.inv(self.frame) @ pose)
 
 
 class SdfReader:
@@ -148,7 +146,8 @@ class SdfReader:
         frame, and its <scale> applies to the shapes.
         """
         self.models, self._count = Models(band, floor), 0
-        wanted, models = _Wanted(frame), self.models
+        x, y, yaw = frame
+        wanted, models = _Wanted(_matrix(x, y, floor, 0.0, 0.0, yaw)), self.models
         states = {state.get("name", ""): state for state in world.findall("state/model")}
         removed = {(name.text or "").strip() for name in world.findall("state/deletions/name")}
         for element in (world, *world.findall("state/insertions")):
@@ -157,12 +156,11 @@ class SdfReader:
                 raise InputError(f"has more than {MAX_MODELS} models, with the included ones")
             for body in scope.bodies:
                 if body.name not in removed:
-                    self._add(scope, body, body.name, wanted, False, states.get(body.name))
+                    with self._naming(body.name):
+                        self._add(scope, body, body.name, wanted, False, states.get(body.name))
         for actor in world.findall("actor"):
-            try:
+            with self._naming(actor.get("name", "actor")):
                 self._actor(actor, wanted)
-            except (Unsupported, FieldError) as reason:
-                models.unsupported.append(f"{actor.get('name', 'actor')} ({reason})")
         models.unsupported += [f"{e.get('name', 'population')} (population)" for e in world.findall("population")]
         return models
 
@@ -182,7 +180,7 @@ class SdfReader:
             if child.tag != "include":
                 continue
             uri, name = ((child.findtext(tag) or "").strip() for tag in ("uri", "name"))
-            try:
+            with self._naming(name or uri or "include"):
                 if USUAL.search(uri):
                     continue
                 found = self._model(uri, file)
@@ -199,10 +197,16 @@ class SdfReader:
                 else:
                     inner = self._scope(model, found, (*trail, found))
                     yield _SdfModel(name or model.get("name", uri), model, child, found, inner)
-            except _Missing as missing:
-                self.models.missing[str(missing)] += 1
-            except (Unsupported, InputError) as error:
-                self.models.unsupported.append(f"{name or uri or 'include'} ({error})")
+
+    @contextlib.contextmanager
+    def _naming(self, part: str) -> Iterator[None]:
+        """Name a part that is missing or unsupported, and go on."""
+        try:
+            yield
+        except _Missing as missing:
+            self.models.missing[str(missing)] += 1
+        except (Unsupported, InputError, FieldError) as reason:
+            self.models.unsupported.append(f"{part} ({reason})")
 
     def _add(
         self, scope: _Scope, body: _SdfModel, name: str, frame: Floats | _Wanted, static: bool, state: ET.Element | None
@@ -213,19 +217,15 @@ class SdfReader:
         """
         models, model = self.models, body.model
         static = static or any(_true(element.findtext("static")) for element in (model, body.placed))
-        try:
-            pose = frame @ scope.of_body(body)
-            scale, links = np.ones(3), {}
-            if state is not None:
-                pose = frame @ read_pose(state.find("pose")) if state.find("pose") is not None else pose
-                scale = numbers(state.findtext("scale") or "1 1 1", 3, "scale")
-                placed = [link for link in state.findall("link") if link.find("pose") is not None]
-                links = {link.get("name"): frame @ read_pose(link.find("pose")) for link in placed}
-            if not (scale > 0).all():
-                raise Unsupported(f"scaled by {scale.min():g}")
-        except Unsupported as reason:
-            models.unsupported.append(f"{name} ({reason})")
-            return
+        pose = frame @ scope.of_body(body)
+        scale, links = np.ones(3), {}
+        if state is not None:
+            pose = frame @ read_pose(state.find("pose")) if state.find("pose") is not None else pose
+            scale = numbers(state.findtext("scale") or "1 1 1", 3, "scale")
+            placed = [link for link in state.findall("link") if link.find("pose") is not None]
+            links = {link.get("name"): frame @ read_pose(link.find("pose")) for link in placed}
+        if not (scale > 0).all():
+            raise Unsupported(f"scaled by {scale.min():g}")
         plugins = [plugin for element in (model, body.placed) for plugin in element.findall("plugin")]
         if any(DRIVES.search(f"{plugin.get('name')} {plugin.get('filename')}") for plugin in plugins):
             at = format_point((float(pose[0, 3]), float(pose[1, 3])), 2)
@@ -236,41 +236,46 @@ class SdfReader:
             for collision in link.findall("collision"):
                 collisions += 1
                 part = "::".join((name, *(element.get("name") or element.tag for element in (link, collision))))
-                try:
-                    place = links[link.get("name")] if link.get("name") in links else pose @ body.scope.place(link)
-                    self._shape(collision, place @ body.scope.place(collision) @ np.diag([*scale, 1.0]), body.file)
-                except _Missing as missing:
-                    models.missing[str(missing)] += 1
-                except (Unsupported, InputError, FieldError) as reason:
-                    models.unsupported.append(f"{part} ({reason})")
+                with self._naming(part):
+                    if link.get("name") in links:
+                        place = links[link.get("name")] @ read_pose(collision.find("pose"))
+                    else:
+                        place = pose @ body.scope.place(collision, body.scope.place(link))
+                    self._shape(collision, place @ np.diag([*scale, 1.0]), body.file)
         if not (collisions or body.scope.bodies):
             models.counts["models without collision shapes"] += 1
         if sum(models.kinds.values()) > before and not static:
             models.counts["bodies that could move, taken to stand still"] += 1
         for inner in body.scope.bodies:
-            self._add(body.scope, inner, f"{name}::{inner.name}", pose, static, None)
+            with self._naming(f"{name}::{inner.name}"):
+                self._add(body.scope, inner, f"{name}::{inner.name}", pose, static, None)
 
     def _shape(self, collision: ET.Element, place: Floats, file: Path) -> None:
         geometry = collision.find("geometry")
         if geometry is None or not len(geometry):
             return
-        found = solid(geometry, place, self.models.band, lambda shape: self._triangles(shape, file))
-        if isinstance(found, str):
-            self.models.counts[found] += 1
-            return
         models, kind = self.models, geometry[0].tag
+        found = solid(geometry, place, models.band, lambda shape: self._triangles(shape, file))
+        if isinstance(found, float):
+            models.planes.append(found)
+            if found > max(models.band[0], BAND[0]):
+                raise Unsupported(f"a plane {found:g} m above the floor")
+            return
+        if isinstance(found, str):
+            models.counts[found] += 1
+            return
         models.kinds[kind] += 1
         if isinstance(found, Disc):
             models.discs.append(found)
-        else:
-            models.solids.append(found)
-        if kind == "mesh" and not isinstance(found, Disc):
+            models.facets = max(models.facets, FACETS * found.radius * (kind != "cylinder"))
+            return
+        models.solids.append(found)
+        if kind == "mesh":
             normals = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
             upward, size = normals[:, 2], np.linalg.norm(normals, axis=1)
             models.sloping += float(upward[(upward > STEEP * size) & (upward < FLAT * size)].sum()) / 2
-        if kind in ROUND and not (isinstance(found, Disc) and kind == "cylinder"):
-            size = found.radius if isinstance(found, Disc) else float(np.ptp(found.reshape(-1, 3), axis=0).max()) / 2
-            models.facets = max(models.facets, FACETS * size)
+        if kind in ROUND:
+            models.facets = max(models.facets, FACETS * float(np.ptp(found.reshape(-1, 3), axis=0).max()) / 2)
 
     def _triangles(self, shape: ET.Element, file: Path) -> Floats:
         """Return the triangles of a <mesh>, (K, 3, 3) [m]."""
@@ -330,9 +335,7 @@ def _candidates(uri: str, source: Path) -> Iterator[Path]:
         inside = "/".join(files).rstrip("/").partition("files/")[2]
         for home in FUEL_FOLDERS:
             folder = Path(os.path.expanduser(home), server, owner.lower(), "models", name.lower())
-            versions = (
-                [path for path in folder.glob("*") if path.name.isdecimal()] if name and os.path.isdir(folder) else []
-            )
+            versions = [path for path in folder.glob("*") if path.name.isdecimal()] if os.path.isdir(folder) else []
             yield from (path / inside for path in sorted(versions, key=lambda path: -int(path.name)))
         rest = f"{name}/{inside}"
     if not rest.strip("/"):
@@ -350,22 +353,19 @@ def _model_file(uri: str, source: Path) -> Path | None:
     for path in _candidates(uri, source):
         if os.path.isfile(path) and path.suffix.lower() in (".sdf", ".world", ".urdf", ".xml"):
             return _real(path)
-        if os.path.isfile(path / "model.config"):
-            files = [
-                (e.get("version", ""), (e.text or "").strip()) for e in parse_xml(path / "model.config").iter("sdf")
-            ]
-            named = [path / name for _, name in sorted(files, reverse=True) if os.path.isfile(path / name)]
-            if named:
-                return _real(named[0])
-        if os.path.isfile(path / "model.sdf"):
-            return _real(path / "model.sdf")
+        config = path / "model.config"
+        entries = parse_xml(config).iter("sdf") if os.path.isfile(config) else ()
+        named = sorted(((e.get("version", ""), (e.text or "").strip()) for e in entries), reverse=True)
+        for _, name in (*named, ("", "model.sdf")):
+            if os.path.isfile(path / name):
+                return _real(path / name)
     return None
 
 
 def read_pose(pose: ET.Element | None) -> Floats:
     """Return the transform (4, 4) of a <pose>: x y z [m] roll pitch yaw [rad] about fixed axes."""
     if pose is None or not (pose.text or "").strip():
-        return np.eye(4)
+        return ORIGIN
     if pose.get("rotation_format", "euler_rpy") != "euler_rpy":
         raise Unsupported(f"a pose with rotation_format={pose.get('rotation_format')!r}")
     x, y, z, *angles = numbers(pose.text, 6, "pose")

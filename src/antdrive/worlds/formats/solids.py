@@ -15,8 +15,8 @@ import numpy as np
 
 from antdrive.base.errors import input_error
 from antdrive.base.plane import tidy
-from antdrive.base.types import Floats
-from antdrive.worlds.formats.cellmap import MAX_DISCS, SLACK, cover_inside, progress_part
+from antdrive.base.types import Floats, Point
+from antdrive.worlds.formats.cellmap import MAX_DISCS, SLACK, cover_inside
 from antdrive.worlds.limits import MAX_COORDINATE
 from antdrive.worlds.world import Disc
 
@@ -29,7 +29,7 @@ MAX_TILES = 500  # with obstacles
 BAND = (0.01, 2.0)  # default heights between which shapes are obstacles, above the floor [m]
 CELL, COARSEST = 0.02, 1.0  # smallest and largest default side of a cell [m]
 MOST_RIMS = 60_000  # sides of blocked cells along free ones, of default cells: about 8,000 discs
-HIGHEST_FLOOR = 0.3  # of plates that cover most of the ground [m]
+HIGHEST_FLOOR, MOST_GROUND = 0.3, 0.75  # height [m] of plates that are the floor, and their least share of the ground
 MAX_POINTS = 10_000  # of a polyline
 
 
@@ -45,15 +45,17 @@ def numbers(text: str | None, count: int, key: str) -> Floats:
         values = np.empty(0)
     if len(values) != count or not (np.abs(values) <= MAX_COORDINATE).all():
         raise Unsupported(
-            f"{key} must be {f'{count} numbers' if count > 1 else 'a number'}, got {(text or '').strip()[:40]!r}"
+            f"{key} must be {f'{count} numbers' if count > 1 else 'a number'} of at most {MAX_COORDINATE:g}, "
+            f"got {(text or '').strip()[:40]!r}"
         )
     return values
 
 
-def _sizes(shape: ET.Element, *keys: str) -> list[float]:
-    values = [float(numbers(shape.findtext(key), 1, key)[0]) for key in keys]
-    if not min(values) > 0:
-        raise Unsupported(f"a {shape.tag} of {' and '.join(f'{k} {v:g}' for k, v in zip(keys, values, strict=True))}")
+def _sizes(shape: ET.Element, *keys: str, count: int = 1) -> Floats:
+    """Parse so many positive numbers under each key."""
+    values = np.concatenate([numbers(shape.findtext(key), count, key) for key in keys])
+    if not (values > 0).all():
+        raise Unsupported(f"a {shape.tag} of {' and '.join(keys)} {' '.join(f'{v:g}' for v in values)}")
     return values
 
 
@@ -62,12 +64,9 @@ def _round(shape: ET.Element) -> tuple[Floats, Floats]:
     half = np.linspace(-math.pi / 2, math.pi / 2, ARC + 1)
     arc = np.column_stack([np.sin(half), np.cos(half)]) / math.cos(math.pi / ARC / 2)
     if shape.tag == "sphere":
-        return arc * _sizes(shape, "radius")[0], np.ones(3)
+        return arc * _sizes(shape, "radius"), np.ones(3)
     if shape.tag == "ellipsoid":
-        radii = numbers(shape.findtext("radii"), 3, "radii")
-        if not (radii > 0).all():
-            raise Unsupported(f"an ellipsoid of radii {radii.min():g}")
-        return arc, radii
+        return arc, _sizes(shape, "radii", count=3)
     radius, length = _sizes(shape, "radius", "length")
     ends = np.array([(-length / 2, radius), (length / 2, 0.0 if shape.tag == "cone" else radius)])
     if shape.tag != "capsule":
@@ -119,8 +118,10 @@ def _extruded(shapes: Sequence[ET.Element]) -> Floats:
 
 def solid(
     geometry: ET.Element, place: Floats, band: tuple[float, float], mesh: Callable[[ET.Element], Floats]
-) -> Disc | Floats | str:
+) -> Disc | Floats | float | str:
     """Return a <geometry> between two heights: a disc, convex pieces (K, V, 3), or why nothing of it is there.
+
+    Of a ground plane, return the height [m].
 
     `place` (4, 4) includes the scale; `mesh` returns the triangles (K, 3, 3) of a <mesh>.
     """
@@ -129,9 +130,9 @@ def solid(
         return "empty"
     if shape.tag == "plane":
         normal = place[:3, :3] @ numbers(shape.findtext("normal") or "0 0 1", 3, "normal")
-        if math.hypot(normal[0], normal[1]) > MAX_TILT * abs(normal[2]):
-            raise Unsupported("a plane that is not horizontal")
-        return "flat"
+        if math.hypot(normal[0], normal[1]) > MAX_TILT * normal[2] or not normal[2] > 0:
+            raise Unsupported("a plane that does not face up")
+        return round(float(place[2, 3]), 6)
     if shape.tag in ROUND:
         profile, stretch = _round(shape)
         place = place @ np.diag([*stretch, 1.0])
@@ -140,13 +141,10 @@ def solid(
         across, axis = np.linalg.norm(place[:3, :3], axis=0), place[:3, 2]
         if math.hypot(axis[0], axis[1]) <= MAX_TILT * across[2] and abs(across[0] - across[1]) <= 1e-9:
             z = place[2, 3] + place[2, 2] * profile[:, 0]
-            return _upright(profile, place, *band) or _where(z, band)
+            return _upright(profile, place, *band) or ("flat" if z.max() <= band[0] else "above")
         pieces = _wedges(profile)
     elif shape.tag == "box":
-        size = numbers(shape.findtext("size"), 3, "size")
-        if not (size > 0).all():
-            raise Unsupported(f"a box of size {' '.join(f'{v:g}' for v in size)}")
-        pieces = np.array([list(itertools.product((-0.5, 0.5), repeat=3))]) * size
+        pieces = np.array([list(itertools.product((-0.5, 0.5), repeat=3))]) * _sizes(shape, "size", count=3)
     elif shape.tag == "polyline":
         pieces = _extruded(geometry.findall("polyline"))
     elif shape.tag == "mesh":
@@ -158,29 +156,20 @@ def solid(
         raise Unsupported(f"reaches beyond {MAX_COORDINATE:g} m")
     z = pieces[:, :, 2]
     reaching = pieces[(z.max(axis=1) > band[0]) & (z.min(axis=1) < band[1])]
-    return reaching if len(reaching) else _where(z, band)
-
-
-def _where(z: Floats, band: tuple[float, float]) -> str:
-    return "flat" if z.max() <= band[0] else "above"
+    return reaching if len(reaching) else "flat" if z.max() <= band[0] else "above"
 
 
 def floor_height(solids: Sequence[Floats]) -> float:
     """Return the height of the floor [m]: of the top of low plates that cover most of the ground, or 0."""
-    tops, areas = [np.empty(0)], [np.empty(0)]
-    for pieces in solids:
-        z, is_box = pieces[:, :, 2], pieces.shape[1] == 8
-        one, two = (pieces[:, i, :2] - pieces[:, 0, :2] for i in ((4, 2) if is_box else (1, 2)))
-        area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-        areas.append(np.abs(area) if is_box else area.clip(min=0) * (np.ptp(z, axis=1) < BAND[0]) / 2)
-        tops.append(z.max(axis=1))
-    low = ((top := np.concatenate(tops)) > 0) & (top <= HIGHEST_FLOOR)
-    if not low.any():
+    low = [pieces[pieces[:, :, 2].max(axis=1) <= HIGHEST_FLOOR] for pieces in solids]
+    if not any(map(len, low)):
         return 0.0
-    covered = np.bincount((top[low] / BAND[0]).round().astype(np.int64), np.concatenate(areas)[low])
-    ends = np.array([[p[:, :, :2].min(axis=(0, 1)), p[:, :, :2].max(axis=(0, 1))] for p in solids])
-    ground = float(np.prod(ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)))
-    return BAND[0] * float(np.flatnonzero(covered > ground / 2).max(initial=0))
+    points = np.concatenate([pieces[:, :, :2].reshape(-1, 2) for pieces in solids])
+    corner, extent = points.min(axis=0), np.ptp(points, axis=0)
+    cell = float(extent.max()) / TILE
+    tops = _rasterised((corner[0], corner[1]), low, (0.0, HIGHEST_FLOOR), cell)
+    areas = np.bincount((tops[tops > 0] / BAND[0]).round().astype(np.int64), minlength=1) * cell**2
+    return BAND[0] * float(areas.argmax()) if areas.max() > MOST_GROUND * extent.prod() else 0.0
 
 
 def cover_pieces(
@@ -200,54 +189,48 @@ def cover_pieces(
         raise input_error(f"its shapes reach over too many cells of {side:g} m; give larger ones with --resolution")
     discs: list[Disc] = []
     reach = 0.0
-    for number, (tile, parts) in enumerate(sorted(tiles.items(), key=lambda item: item[0])):
-        with progress_part(number, len(tiles)):
-            corner, tops = _rasterised(tile, parts, band, side)
-            covered = cover_inside(tops > -np.inf, side, (corner[0], corner[1]), side if overhang is None else overhang)
-            reach = max(reach, covered.overhang)
-            for x, y, radius in covered.discs.tolist():
-                row, col = (y - corner[1]) / side, (x - corner[0]) / side
-                low, high = (math.floor(max(v - radius / side, 0.0)) for v in (row, col)), radius / side
-                rows, cols = (slice(first, math.floor(v + high) + 1) for first, v in zip(low, (row, col), strict=True))
-                discs.append(Disc(tidy(x), tidy(y), radius, float(tops[rows, cols].max())))
+    for number, tile in enumerate(sorted(tiles), 1):
+        x0, y0 = tile
+        tops = _rasterised(tile, tiles[tile], band, side)
+        blocked, most = tops > -np.inf, side if overhang is None else overhang
+        covered = cover_inside(blocked, side, (x0, y0), most, number / len(tiles))
+        reach = max(reach, covered.overhang)
+        for x, y, radius in covered.discs.tolist():
+            left, right, low, high = (
+                int(max(v, 0.0) / side) for v in (x - radius - x0, x + radius - x0, y - radius - y0, y + radius - y0)
+            )
+            discs.append(Disc(tidy(x), tidy(y), radius, float(tops[low : high + 1, left : right + 1].max())))
     if len(discs) > MAX_DISCS:
-        problem = (
-            f"needs {len(discs)} cylinders; the limit is {MAX_DISCS}; a larger --resolution or --overhang needs fewer"
-        )
-        raise input_error(problem)
+        fewer = "a larger --resolution or --overhang needs fewer"
+        raise input_error(f"needs {len(discs)} cylinders; the limit is {MAX_DISCS}; {fewer}")
     return discs, reach + math.sqrt(2.0) * side
 
 
-_Tiles = dict[tuple[int, int], list[Floats]]
-
-
-def _tiles(solids: Sequence[Floats], cell: float) -> _Tiles | None:
-    """Return the pieces in each tile of cells; None if there are too many tiles."""
-    tiles: _Tiles = {}
+def _tiles(solids: Sequence[Floats], cell: float) -> dict[Point, list[Floats]] | None:
+    """Return the pieces in each tile of cells by its lower left corner [m]; None if there are too many tiles."""
+    tiles: dict[Point, list[Floats]] = {}
     for pieces in solids:
         ends = np.hstack([pieces[:, :, :2].min(axis=1), pieces[:, :, :2].max(axis=1)])
         spans, span_of = np.unique(np.floor(ends / (TILE * cell)).astype(np.int64), axis=0, return_inverse=True)
         for n, (left, below, right, above) in enumerate(spans.tolist()):
             if len(tiles) + (right - left + 1) * (above - below + 1) > MAX_TILES:
                 return None
-            for tile in itertools.product(range(left, right + 1), range(below, above + 1)):
-                tiles.setdefault(tile, []).append(pieces[span_of.ravel() == n])
+            for col, row in itertools.product(range(left, right + 1), range(below, above + 1)):
+                tiles.setdefault((col * TILE * cell, row * TILE * cell), []).append(pieces[span_of.ravel() == n])
     return tiles
 
 
-def _rims(tiles: _Tiles, band: tuple[float, float], cell: float) -> int:
+def _rims(tiles: dict[Point, list[Floats]], band: tuple[float, float], cell: float) -> int:
     """Return how many blocked cells have a free neighbour to the right or above."""
-    blocked = (_rasterised(tile, parts, band, cell)[1] > -np.inf for tile, parts in tiles.items())
-    return sum(int((cells[1:] != cells[:-1]).sum() + (cells[:, 1:] != cells[:, :-1]).sum()) for cells in blocked)
+    blocked = (_rasterised(corner, parts, band, cell) > -np.inf for corner, parts in tiles.items())
+    return sum(int(np.count_nonzero(np.diff(cells, axis=axis))) for cells in blocked for axis in (0, 1))
 
 
-def _rasterised(
-    tile: tuple[int, int], parts: Sequence[Floats], band: tuple[float, float], cell: float
-) -> tuple[list[float], Floats]:
-    """Return a tile's lower left corner [m] and the tops of the pieces over its cells (TILE, TILE); -inf where none are."""
+def _rasterised(corner: Point, parts: Sequence[Floats], band: tuple[float, float], cell: float) -> Floats:
+    """Return the tops of pieces over the cells (TILE, TILE) from a lower left corner [m]; -inf where none are."""
     from antdrive.worlds.formats._kernels_cover import mark_pieces
 
-    corner, tops = np.array(tile) * (TILE * cell), np.full((TILE, TILE), -np.inf)
+    tops = np.full((TILE, TILE), -np.inf)
     for pieces in parts:
-        mark_pieces(pieces, *band, corner, cell, SLACK, tops)
-    return corner.tolist(), tops
+        mark_pieces(pieces, *band, np.array(corner), cell, SLACK, tops)
+    return tops

@@ -46,7 +46,7 @@ def test_the_chosen_ends_and_each_remark_have_a_line(antdrive, tmp_path):
     (tmp_path / "one.world").write_text(f"<sdf version='1.6'><model name='m'><link name='l'>{box}</link></model></sdf>")
     code, out, err = antdrive("worlds", "import", "one.world", "--resolution=0.05", "--band=0.2,1")
     assert (code, err) == (0, "")
-    assert "  the shapes between 0.2 and 1 m (1 box) are fully covered" in out.splitlines()
+    assert "  shapes between 0.2 and 1 m: 1 box" in out.splitlines()
     assert "  bodies that could move, taken to stand still: 1" in out.splitlines()
     assert "--start and --goal" in out
     assert (
