@@ -6,6 +6,7 @@ import io
 import logging
 import math
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,9 @@ def read_mesh(file: Path) -> tuple[Floats, npt.NDArray[np.int64]]:
     level = log.level
     log.setLevel(logging.CRITICAL)  # it logs each texture that it does not find
     try:  # trimesh merges vertices, and with them drops those that are not numbers: checked before
-        loaded = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=kind in CHECKED)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # pycollada's, of NumPy 2.5
+            loaded = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=kind in CHECKED)
         vertices = np.asarray(getattr(loaded, "vertices", ()), dtype=np.float64).reshape(-1, 3)
         faces = np.asarray(getattr(loaded, "faces", ()), dtype=np.int64).reshape(-1, 3)
     except Exception as error:  # each format has its own exceptions
