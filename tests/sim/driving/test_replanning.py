@@ -461,6 +461,11 @@ def test_auto_takes_the_footprint_on_cells_that_the_planner_can_search(robot, wo
     assert (grid.cell if grid.turns else None) == cell
 
 
+def test_a_footprint_is_planned_on_the_task_s_cells_where_finer_ones_are_too_many():
+    large = Task(World("large", (0.0, 0.0, 300.0, 300.0), ()), (5.0, 5.0, 0.0), (9.0, 5.0), cell=0.5)
+    assert route_planner(Scenario.of(large, "astar", "warehouse", footprint="exact")).chosen_grid().cell == 0.5
+
+
 @pytest.mark.parametrize("planner", ["dstar-lite", "dstar"])
 @pytest.mark.parametrize("mapped", [True, False])
 def test_plans_for_a_footprint_are_repaired_and_as_short_as_those_from_scratch(planner, mapped, turtlebot, monkeypatch):

@@ -40,6 +40,7 @@ from antdrive.sim.driving.rules import Schedule
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.reasons import no_path_reason
 from antdrive.worlds import Disc, Grid, MoverMotion, Route, Task, World, rasterise
+from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.raster import Raster
 from antdrive.worlds.world import by_geometry
 
@@ -113,8 +114,9 @@ class RoutePlanner:
 
     @property
     def outlined_cell(self) -> float:
-        """Side of the cells of plans for the footprint [m]; iterative planners try larger ones first."""
-        return min(self.cell, FINE)
+        """Side of the cells of plans for the footprint [m]; iterative planners, and large worlds, have larger ones."""
+        fits = math.prod(side + FINE for side in self.task.world.size) <= MAX_CELLS * FINE**2
+        return min(self.cell, FINE) if fits else self.cell
 
     @functools.cached_property
     def can(self) -> Capabilities:
