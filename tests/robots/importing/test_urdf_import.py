@@ -34,8 +34,6 @@ CATALOGUE = {
 
 
 def imported(name, **settings):
-    if name.endswith(".xacro"):
-        pytest.importorskip("xacrodoc")
     return import_urdf(FIXTURES / name, **settings)
 
 
@@ -454,7 +452,6 @@ def test_higher_pieces_and_missing_meshes_are_omitted_on_request(tmp_path):
 
 
 def test_a_mesh_is_read_with_its_scale(tmp_path):
-    pytest.importorskip("trimesh")
     corners = [(x, y, z) for x in (-1, 1) for y in (-2, 2) for z in (-1, 1)]
     (tmp_path / "meshes").mkdir()
     text = "".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "f 1 2 3\nf 6 7 8\nf 1 5 8\nf 2 4 6\nf 3 4 7\n"
@@ -470,8 +467,6 @@ def test_a_mesh_is_read_with_its_scale(tmp_path):
 @pytest.mark.parametrize(("unit", "scale"), [('<unit meter="0.001" name="millimetre"/>', 1.0), ("", 0.001)])
 def test_the_unit_of_a_collada_mesh_counts(tmp_path, unit, scale):
     """A box of 400 x 300 x 100 units, as few tags as COLLADA allows."""
-    pytest.importorskip("trimesh")
-    pytest.importorskip("collada")
     corners = " ".join(f"{x} {y} {z}" for x in (-200, 200) for y in (-150, 150) for z in (-50, 50))
     faces = "0 1 3 0 3 2 4 6 7 4 7 5 0 4 5 0 5 1 2 3 7 2 7 6 0 2 6 0 6 4 1 5 7 1 7 3"
     (tmp_path / "body.dae").write_text(
@@ -631,7 +626,6 @@ def test_the_yaw_of_the_axle_is_the_robots(tmp_path):
     ids=["expression", "package", "macro"],
 )
 def test_what_xacro_cannot_expand_is_refused_in_one_line(tmp_path, inside, says):
-    pytest.importorskip("xacrodoc")
     path = tmp_path / "robot.xacro"
     path.write_text(f'<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="x">{inside}</robot>')
     with pytest.raises(InputError) as caught:
@@ -644,7 +638,6 @@ def test_what_xacro_cannot_expand_is_refused_in_one_line(tmp_path, inside, says)
 
 
 def test_a_pipe_that_a_xacro_file_includes_is_refused(tmp_path, monkeypatch):
-    pytest.importorskip("xacrodoc")
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "robot.xacro"
     head = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="x">'
@@ -660,7 +653,6 @@ def test_a_pipe_that_a_xacro_file_includes_is_refused(tmp_path, monkeypatch):
 
 
 def test_xacro_takes_arguments_and_finds_packages_beside_the_file(tmp_path):
-    pytest.importorskip("xacrodoc")
     text = (FIXTURES / "burger.urdf").read_text()
     top = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="$(arg name)">'
     body = text.partition("<robot")[2].partition(">")[2].partition("</robot>")[0]
@@ -697,7 +689,6 @@ def test_an_unknown_argument_is_refused_with_those_that_exist(tmp_path):
 
 
 def test_meshes_of_a_package_are_in_its_given_folder(tmp_path):
-    pytest.importorskip("trimesh")
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "body.obj").write_text(
         "v -0.2 -0.2 0.1\nv 0.2 -0.2 0.1\nv 0.2 0.2 0.1\nv -0.2 0.2 0.1\nf 1 2 3\nf 1 3 4\n"
