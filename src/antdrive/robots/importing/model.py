@@ -30,7 +30,7 @@ from antdrive.base.optional import optional
 from antdrive.base.ros import ros_package
 from antdrive.base.types import Floats
 from antdrive.worlds.formats.meshes import read_mesh
-from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml, rotation_matrix
+from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml, pose_matrix
 
 STAND_IN = f"{os.sep}missing package "  # start of the path of a missing package
 
@@ -476,10 +476,8 @@ def _positive(path: Path, where: str, what: str, value: float, *, or_0: bool = F
 def _origin(path: Path, element: ET.Element) -> Floats:
     """Return the frame (4, 4) of an element's <origin>."""
     origin = element.find("origin")
-    place = np.eye(4)
-    place[:3, :3] = rotation_matrix(*_numbers(path, origin, "rpy", (0.0, 0.0, 0.0)))
-    place[:3, 3] = _numbers(path, origin, "xyz", (0.0, 0.0, 0.0))
-    return place
+    position, angles = (_numbers(path, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+    return pose_matrix(position, angles)
 
 
 def _joint(path: Path, element: ET.Element) -> UrdfJoint:

@@ -22,7 +22,7 @@ from antdrive.base.ros import folders_in, ros_package
 from antdrive.base.types import Floats, Pose
 from antdrive.worlds.formats.meshes import read_mesh
 from antdrive.worlds.formats.solids import BAND, FACETS, ROUND, Unsupported, numbers, solid
-from antdrive.worlds.formats.xml import parse_xml, rotation_matrix
+from antdrive.worlds.formats.xml import parse_xml, pose_matrix
 from antdrive.worlds.movers import Keyframed, Loop
 from antdrive.worlds.world import Disc
 
@@ -147,7 +147,7 @@ class SdfReader:
         """
         self.models, self._count = Models(band, floor), 0
         x, y, yaw = frame
-        wanted, models = _Wanted(_matrix(x, y, floor, 0.0, 0.0, yaw)), self.models
+        wanted, models = _Wanted(pose_matrix((x, y, floor), (0.0, 0.0, yaw))), self.models
         states = {state.get("name", ""): state for state in world.findall("state/model")}
         removed = {(name.text or "").strip() for name in world.findall("state/deletions/name")}
         for element in (world, *world.findall("state/insertions")):
@@ -371,11 +371,4 @@ def read_pose(pose: ET.Element | None) -> Floats:
     x, y, z, *angles = numbers(pose.text, 6, "pose")
     if _true(pose.get("degrees")):
         angles = [math.radians(a) for a in angles]
-    return _matrix(x, y, z, *angles)
-
-
-def _matrix(x: float, y: float, z: float, *angles: float) -> Floats:
-    """Return the transform (4, 4) of a position [m] and of roll, pitch and yaw about fixed axes [rad]."""
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rotation_matrix(*angles), (x, y, z)
-    return matrix
+    return pose_matrix((x, y, z), angles)

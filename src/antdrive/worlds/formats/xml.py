@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -62,6 +63,13 @@ def parse_xml(path: Path, text: str | None = None) -> ET.Element:
             raise input_error(str(path), f"not XML: {error}") from None
         raise
     return builder.close()
+
+
+def pose_matrix(position: Iterable[float], angles: Iterable[float]) -> Floats:
+    """Return the transform (4, 4) of a position [m] and of roll, pitch and yaw about fixed axes [rad]."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation_matrix(*angles), tuple(position)
+    return matrix
 
 
 def rotation_matrix(roll: float, pitch: float, yaw: float) -> Floats:
