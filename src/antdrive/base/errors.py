@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 
 class InputError(ValueError):
@@ -52,6 +53,12 @@ def visible(text: str, kept: str = "") -> str:
         kept: characters to keep, such as line breaks
     """
     return "".join(c if c.isprintable() or c in kept else repr(c)[1:-1] for c in text)
+
+
+def few(items: Iterable[object], most: int = 4, between: str = ", ") -> str:
+    """Return the first of some items without repetitions, and how many more there are."""
+    every = list(dict.fromkeys(map(str, items)))
+    return between.join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
 def require_positive(key: str, value: float) -> None:

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from antdrive.base.errors import InputError, input_error
+from antdrive.base.errors import InputError, few, input_error
 from antdrive.base.files import read_bytes
 from antdrive.runs.barn_challenge import Formula
 
@@ -133,12 +133,12 @@ def score_log(trials: Sequence[Trial], formulas: Mapping[Formula, Mapping[str, f
 def _gaps(counts: Mapping[int, int]) -> Iterator[str]:
     """Yield how the numbers of trials differ from the challenge's 50 public worlds with 10 trials each."""
     if missing := sorted(set(PUBLIC) - set(counts)):
-        yield f"{len(PUBLIC) - len(missing)} of the {len(PUBLIC)} public worlds; missing: {_listed(missing)}"
+        yield f"{len(PUBLIC) - len(missing)} of the {len(PUBLIC)} public worlds; missing: {few(missing, 10)}"
     if other := sorted(set(counts) - set(PUBLIC)):
-        yield f"worlds that are not among the {len(PUBLIC)} public ones: {_listed(other)}"
+        yield f"worlds that are not among the {len(PUBLIC)} public ones: {few(other, 10)}"
     for words, kept in (("fewer", range(TRIALS)), ("more", range(TRIALS + 1, sys.maxsize))):
         if found := [f"{world} ({counts[world]})" for world in sorted(counts) if counts[world] in kept]:
-            yield f"worlds with {words} than {TRIALS} trials: {_listed(found)}"
+            yield f"worlds with {words} than {TRIALS} trials: {few(found, 10)}"
 
 
 def _notes(trials: Sequence[Trial], scored: Callable[[Trial], float]) -> Iterator[str]:
@@ -150,9 +150,4 @@ def _notes(trials: Sequence[Trial], scored: Callable[[Trial], float]) -> Iterato
         yield f"{len(wrong)} of {len(trials)} lines log another score; {facts}; logged scores are not used"
     counts = Counter((one.world, one.seconds) for one in trials if one.succeeded)
     if twice := [f"{world} ({seconds:.4f} s)" for (world, seconds), count in counts.items() if count > 1]:
-        yield f"successful trials with the same world and time: {_listed(twice)}"
-
-
-def _listed(items: Sequence[object]) -> str:
-    more = f" and {len(items) - 10} more" if len(items) > 10 else ""
-    return ", ".join(map(str, items[:10])) + more
+        yield f"successful trials with the same world and time: {few(twice, 10)}"

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, few
 from antdrive.sim.settings import COMPARED_SMOOTHING
 
 if TYPE_CHECKING:
@@ -191,7 +191,7 @@ class Comparison:
             return ""
         if len(places) == len(self.cases):
             return f" (in all {len(places)} cases)"
-        return f" ({'; '.join(places[:5])}{f' and {len(places) - 5} more' if len(places) > 5 else ''})"
+        return f" ({few(places, 5, '; ')})"
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, for JSON."""

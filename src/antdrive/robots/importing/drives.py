@@ -10,6 +10,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from antdrive.base.errors import few
 from antdrive.base.types import Floats
 from antdrive.robots.importing.model import OtherDriveError, UrdfJoint, UrdfModel
 
@@ -245,9 +246,3 @@ def _legs(model: UrdfModel, wheels: Sequence[UrdfJoint]) -> list[str]:
 
 def _named(joints: Iterable[UrdfJoint]) -> str:
     return few(joint.name for joint in joints)
-
-
-def few(names: Iterable[str]) -> str:
-    """Return at most four different names, and how many more there are."""
-    some = list(dict.fromkeys(names))
-    return ", ".join(some[:4]) + (f" and {len(some) - 4} more" if len(some) > 4 else "")

@@ -7,8 +7,9 @@ from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
+from antdrive.base.errors import few
 from antdrive.base.types import Floats
-from antdrive.robots.importing.drives import few, stands, turns_as_wheel
+from antdrive.robots.importing.drives import stands, turns_as_wheel
 from antdrive.robots.importing.model import CollisionPiece, UrdfModel
 from antdrive.robots.outline import Footprint
 from antdrive.robots.spec import GRAVITY, RobotSpec

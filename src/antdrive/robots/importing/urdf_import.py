@@ -16,10 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.base.errors import InputError, input_error
+from antdrive.base.errors import InputError, few, input_error
 from antdrive.base.records import ranges_of
 from antdrive.base.types import Floats
-from antdrive.robots.importing.drives import few
 from antdrive.robots.importing.hull import footprint_around
 from antdrive.robots.importing.model import CollisionPiece, UrdfModel, read_model, solid_tag
 from antdrive.robots.importing.plausible import below_arms, implausible, plausible_speeds
@@ -187,9 +186,13 @@ class _Value(NamedTuple):
     how: str
 
     @property
+    def assumed(self) -> bool:
+        return self.how.startswith("assumed")
+
+    @property
     def doubtful(self) -> bool:
         """Whether it is an assumed speed, or the drive plugin contradicts it."""
-        return (self.key == "max_speed" and self.how.startswith("assumed")) or self.how.endswith(DOUBT)
+        return (self.key == "max_speed" and self.assumed) or self.how.endswith(DOUBT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,9 +251,7 @@ def import_urdf(
         notes = [
             *notes_on_wheels(model, wheels),
             *doubts,
-            *implausible(
-                spec, wheels[0].span, {*given, *(value.key for value in values if value.how.startswith("assumed"))}
-            ),
+            *implausible(spec, wheels[0].span, {*given, *(value.key for value in values if value.assumed)}),
             *below_arms(model, low, frame, floor),
             *unused,
             *(["the file has no collision geometry: the drawn one counts"] if drawn else []),

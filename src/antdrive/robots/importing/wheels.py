@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from antdrive.base.errors import InputError, input_error
+from antdrive.base.errors import InputError, few, input_error
 from antdrive.base.types import Floats
 from antdrive.robots.importing.drives import (
     PASSIVE,
-    few,
     free_wheels,
     is_free,
     not_driven,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, few
 from antdrive.base.types import Flags, Floats
 from antdrive.sim.settings import SETTING_COLUMNS
 from antdrive.sim.settings import SETTINGS as DECLARED
@@ -53,7 +53,7 @@ def described(values: Sequence[Any]) -> str:
     if len(numbers) > LISTED:
         return f"{min(numbers):g} to {max(numbers):g}"
     texts = [f"{value:g}" if isinstance(value, float) else _text(value) or NONE for value in different]
-    return ", ".join(texts[:LISTED]) + (f" and {len(texts) - LISTED} more" if len(texts) > LISTED else "")
+    return few(texts, LISTED)
 
 
 def _text(value: Any) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.atomic import atomic_write, write_text
-from antdrive.base.errors import FieldError, input_error
+from antdrive.base.errors import FieldError, few, input_error
 from antdrive.base.files import read_bytes
 from antdrive.base.types import Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
@@ -139,7 +139,7 @@ def _scen_of(file: Path) -> Path:
     usual = file.with_name(f"{file.name}.scen")
     others = [] if usual.exists() else sorted(file.parent.glob(f"{glob.escape(file.stem)}*.scen"))
     if len(others) > 1:
-        names = ", ".join(other.name for other in others[:MOST_NAMES]) + (" and more" if others[MOST_NAMES:] else "")
+        names = few((other.name for other in others), MOST_NAMES)
         raise FieldError("scen", f"choose one of {names}")
     return others[0] if others else usual
 

@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 from xml.sax.saxutils import quoteattr
 
 from antdrive.base.atomic import write_text
-from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.errors import FieldError, InputError, few, input_error
 from antdrive.base.plane import end_in_world
 from antdrive.base.types import Bounds, Point, Pose
 from antdrive.worlds.files.world_file import require_no_movers
@@ -191,8 +191,7 @@ def _about_unsupported(models: Models) -> str:
     if any("://fuel" in uri for uri in missing):
         problems.append("download Fuel's with: gz fuel download -u URL")
     if parts:
-        names = ", ".join(parts[:5]) + (f" and {len(parts) - 5} more" if parts[5:] else "")
-        problems.append(f"parts that cannot be imported ({len(parts)}): {names}")
+        problems.append(f"parts that cannot be imported ({len(parts)}): {few(parts, 5)}")
     return "; ".join([*problems, "--skip-unsupported leaves them out"])
 
 
