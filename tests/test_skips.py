@@ -20,7 +20,7 @@ def test_wrong(): assert False
 def test_a_skip_for_want_of_a_package_fails(tmp_path):
     for name, text in TESTS.items():
         (tmp_path / name).write_text(text)
-    words = ("-p", "tests.conftest", "-p", "no:cacheprovider", "-q", "--continue-on-collection-errors")
+    words = ("-p", "tests.conftest", "-p", "no:cacheprovider", "-q", "-rN", "--continue-on-collection-errors")
     line = [sys.executable, "-m", "pytest", *words, "--rootdir", tmp_path, tmp_path]
     done = subprocess.run(line, capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stdout
