@@ -10,18 +10,19 @@ from types import MappingProxyType
 from typing import Any
 
 from antdrive.base.errors import InputError, input_error
-from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.facts import FACTS, Logged, facts_of
+from antdrive.sim.log.certificate import Certificate
 from antdrive.sim.log.margin import has_default
-from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
 from antdrive.sim.repeating import command_of
-from antdrive.sim.verifying import false_claims, logged_settings, read_result
+from antdrive.sim.verifying import false_claims, read_result
 from antdrive.views.pages.rendering import NONE, TextTable, number, shown
 
+WRITTEN = tuple(name for name, fact in FACTS.items() if fact.proof == "written")
 LONGEST_COMMAND = 4000  # characters
 UNDRIVEN = (Outcome.NO_PATH.key, Outcome.STOPPED.key)  # outcomes of runs without a log
 CONTACT = (Outcome.COLLIDED.key, Outcome.INVALID_PLAN.key)  # outcomes with a red badge
@@ -265,13 +266,14 @@ def find_runs(folder: Path) -> Iterator[ReportedRun]:
 def log_facts(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts:
     """Compute the facts of a log, and its contradictions with the result beside it."""
     try:
-        certificate, metrics, digest = certify(rollout), measure(rollout), rollout.digest
-        sights = tuple(passed(rollout))
+        log = Logged.of(rollout)
+        metrics, sights = log.metrics, tuple(passed(rollout))
     except ValueError as error:
         raise input_error(name, str(error)) from None
-    claims = tuple(shown(claim) for claim in false_claims(result, rollout, certificate, metrics, digest))
-    command, settings = shown(command_of(rollout) or "", LONGEST_COMMAND), logged_settings(rollout)
-    return LogFacts(rollout.record, certificate, metrics, sights, len(rollout.scans), digest, settings, claims, command)
+    claims = tuple(shown(claim) for claim in false_claims(result, log))
+    command, settings = shown(command_of(rollout) or "", LONGEST_COMMAND), facts_of(log, WRITTEN)
+    scans, digest = len(rollout.scans), rollout.digest
+    return LogFacts(rollout.record, log.certificate, metrics, sights, scans, digest, settings, claims, command)
 
 
 def reported_run(run: Run) -> ReportedRun:
