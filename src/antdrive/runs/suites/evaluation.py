@@ -277,7 +277,7 @@ def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluatio
                     missing.append(name)
             faults += _line_faults(run.rollout, baseline, demands)
             if missing:
-                notes.append(f"not compared: {', '.join(missing)}; missing or null in the baseline: renew it")
+                notes.append(f"not compared: {', '.join(missing)}; the baseline has no value; antdrive accept adds it")
     return Evaluation(tuple(faults), tuple(gains), tuple(notes))
 
 
