@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from antdrive.base.kernel_cache import COMPILING
 from antdrive.cli.commands import COMMANDS, ROBOTS, WORLDS
-from antdrive.cli.console import COMPILING
 from antdrive.cli.exits import BROKEN_PIPE
 from antdrive.cli.groups import application
 from antdrive.planners import PLANNERS, on_progress

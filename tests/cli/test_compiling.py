@@ -7,8 +7,9 @@ import sys
 import pytest
 
 from antdrive.base import kernel_cache
+from antdrive.base.kernel_cache import COMPILING
 from antdrive.cli.compiling import TOGETHER, _plan_with
-from antdrive.cli.console import COMPILING, bar, report_compiling
+from antdrive.cli.console import bar, report_compiling
 from antdrive.planners import PLANNERS
 
 

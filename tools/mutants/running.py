@@ -25,7 +25,7 @@ from pathlib import Path
 from tools.mutants.operators import Mutant
 
 SOURCE = "src/antdrive"  # the files of plans are named from here
-ROOMS = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli")
+ROOMS = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "testing", "cli")
 LEFT_OUT = (".*", "out", "examples", "docs")
 LOADED = ("base/*.py", "worlds/*.py", "worlds/files/*.py", "planners/**/*.py", "robots/**/*.py", "sim/log/*.py",
           "sim/physics/*.py", "sim/sensing/*.py", "sim/driving/*.py", "sim/pipeline.py")  # fmt: skip

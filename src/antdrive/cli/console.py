@@ -22,7 +22,6 @@ LAYOUT = "\n\t"  # control characters that lines may hold
 GOOD, BAD = "✓", "✗"  # signs of success and failure
 COLOURS = {GOOD: "\033[32m{}\033[0m", BAD: "\033[31m{}\033[0m"}  # green and red
 PLAIN = {GOOD: "+", BAD: "x"}  # for streams that cannot encode the signs
-COMPILING = "compiling planner, drive and film, once per installation: up to 1 min"
 LEAST_WRAPPED = 24  # least width of a wrapped column [characters]
 
 
@@ -67,7 +66,7 @@ def report_compiling() -> None:
     """Print a line when the first kernel compiles; progress bars count the kernels."""
     from antdrive.base import kernel_cache
 
-    lines = iter([COMPILING])
+    lines = iter([kernel_cache.COMPILING])
 
     def compiles(_: str) -> None:
         for line in lines:

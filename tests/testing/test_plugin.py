@@ -17,15 +17,15 @@ import pytest
 # pytester forgets what a run of pytest has imported, so that the next run would import all of it again.
 from antdrive import list_robots
 from antdrive.base import kernel_cache
-from antdrive.cli.console import COMPILING
-from antdrive.cli.testing import evaluation
+from antdrive.base.kernel_cache import COMPILING
+from antdrive.testing import evaluation
 
 # What the compiler loads when it first compiles must not be forgotten either: it cannot be loaded twice.
 numba.njit(lambda: 0.0)()
 pytest_plugins = ["pytester"]
-PLUGIN = ("-p", "antdrive.cli.testing.plugin", "-p", "no:cacheprovider")
+PLUGIN = ("-p", "antdrive.testing.plugin", "-p", "no:cacheprovider")
 RUN_FIGURES, PLAN_FIGURES = (f"antdrive.views.figures.{name}_figures." for name in ("run", "plan"))
-for module in (RUN_FIGURES, PLAN_FIGURES, "antdrive.cli.testing.evaluation"):  # what is replaced here is not forgotten
+for module in (RUN_FIGURES, PLAN_FIGURES, "antdrive.testing.evaluation"):  # what is replaced here is not forgotten
     importlib.import_module(module.removesuffix("."))
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}

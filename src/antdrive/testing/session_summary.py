@@ -10,7 +10,7 @@ from typing import Any
 
 from antdrive.base.atomic import atomic_write
 from antdrive.base.files import without_waiting
-from antdrive.cli.testing.evaluation import CheckResult
+from antdrive.testing.evaluation import CheckResult
 
 #: Metrics in test reports.
 SHOWN = ("min_clearance_m", "duration_s", "driven_length_m")

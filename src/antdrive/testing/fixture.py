@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.errors import FieldError
-from antdrive.cli.testing.evaluation import Check, CheckResult, Update
 from antdrive.planners import PLANNERS, Planner, PlannerError, is_built_in
 from antdrive.robots import RobotSpec, list_robots
 from antdrive.runs.suites.demands import Demands
@@ -23,6 +22,7 @@ from antdrive.sim.pipeline import run as drive_scenario
 from antdrive.sim.rerun import fingerprint
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.settings import tested_settings
+from antdrive.testing.evaluation import Check, CheckResult, Update
 from antdrive.views.artefacts import Results, file_name
 from antdrive.worlds import Task, list_worlds
 

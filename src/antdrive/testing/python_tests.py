@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.files import MAX_BYTES, read_bytes
-from antdrive.cli.testing.evaluation import INVALID_INPUT, CheckResult, Update
 from antdrive.runs.suites.suite import SUFFIX
+from antdrive.testing.evaluation import INVALID_INPUT, CheckResult, Update
 
 if TYPE_CHECKING:
     import pytest
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 #: Outcome of a test whose drives passed, but not the test.
 FAILED_OTHERWISE = "test_failed"
-PLUGIN = "antdrive.cli.testing.plugin"
+PLUGIN = "antdrive.testing.plugin"
 UPDATES: dict[Update, list[str]] = {"": [], "new": ["--drive-update-new"], "all": ["--drive-update"]}
 
 
@@ -107,7 +107,7 @@ class _Drives:
 
     def pytest_runtest_makereport(self, item: pytest.Item) -> None:
         """Take the results of a test's drives."""
-        from antdrive.cli.testing.plugin import results_in
+        from antdrive.testing.plugin import results_in
 
         self._of_test = results_in(item)
 
@@ -125,7 +125,7 @@ class _Drives:
 
     def pytest_unconfigure(self, config: pytest.Config) -> None:
         """Keep the unused baselines."""
-        from antdrive.cli.testing.plugin import unused_in
+        from antdrive.testing.plugin import unused_in
 
         self.unused |= unused_in(config)
 

@@ -5,3 +5,5 @@ from .fixture import DriveFailure as DriveFailure
 from .fixture import DriveFixture as DriveFixture
 from .fixture import assert_collision_free as assert_collision_free
 from .fixture import assert_reached_goal as assert_reached_goal
+from .strategies import tasks as tasks
+from .strategies import worlds as worlds
