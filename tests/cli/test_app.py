@@ -31,6 +31,20 @@ def test_help_lists_every_command_with_the_first_line_of_its_own(antdrive, group
         assert (function.__doc__ or "").split("\n")[0] == command.summary
 
 
+def every_command(command, words=()):
+    """The words of all commands, groups first."""
+    yield words
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from every_command(inner, (*words, name))
+
+
+def test_the_help_of_every_command_is_as_recorded(antdrive, monkeypatch, file_regression):
+    monkeypatch.setenv("COLUMNS", "80")
+    texts = [antdrive(*words, "--help") for words in every_command(application())]
+    assert {(code, err) for code, _, err in texts} == {(0, "")}
+    file_regression.check("\n".join(out for _, out, _ in texts), basename="help")
+
+
 @pytest.mark.parametrize("name", [*COMMANDS, *(f"worlds {name}" for name in WORLDS)])
 def test_every_option_is_explained_with_its_unit(name):
     command = application()
