@@ -32,7 +32,7 @@ from antdrive.sim import Outcome, Perception, Rollout, Scenario, run
 from antdrive.sim.log.contacts import touches_of
 from antdrive.worlds import CellMap, Keyframed, Task, Trajectories, World, map_task, point_clearance, rasterise
 from antdrive.worlds.formats.cellmap import largest_ground
-from benchmarks.kinds import with_lidar
+from benchmarks.drives import with_lidar
 from benchmarks.markdown import command_line, table
 
 SMALLEST = ("--offices 1 --only astar/velocities/0",)

@@ -26,9 +26,8 @@ from pathlib import Path
 
 import yaml
 
-from benchmarks.markdown import command_line, print_table
-from benchmarks.resuming import append_line, current_commit, read_lines
-from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, rounds_with_pytest, with_check
+from benchmarks.markdown import append_line, command_line, current_commit, print_table, read_lines
+from tests.audit.suite_runs import EXAMPLE, PLUGINS, Tests, environment, rounds_with_pytest, with_check
 
 SMALLEST = ("--scenarios 2 --jobs 1", "--repeats 1 --within 1")
 

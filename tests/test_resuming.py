@@ -7,8 +7,8 @@ import pytest
 
 from antdrive.planners import load_planner
 from benchmarks import readings, suites
-from benchmarks.resuming import append_line, read_lines
-from benchmarks.suite_runs import rounds_with_pytest
+from benchmarks.markdown import append_line, read_lines
+from tests.audit.suite_runs import rounds_with_pytest
 
 
 def test_a_file_holds_whole_lines(tmp_path):

@@ -1,6 +1,6 @@
-"""Suite runs in other processes, for `benchmarks.planted` and `benchmarks.suites`.
+"""Suite runs in other processes, for `tests.audit.planted` and `benchmarks.suites`.
 
-As a pytest plugin, `-p benchmarks.suite_runs`, it writes each test's result to the file named by ANTDRIVE_RUN, shuffles the
+As a pytest plugin, `-p tests.audit.suite_runs`, it writes each test's result to the file named by ANTDRIVE_RUN, shuffles the
 tests with the seed in ANTDRIVE_SHUFFLE, and runs each test ANTDRIVE_TIMES times.
 """
 
@@ -18,9 +18,9 @@ from typing import Any, TypeAlias
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "regression_suite"
-PLUGINS = ("-p", "antdrive.cli.testing.plugin", "-p", "benchmarks.suite_runs", "-p", "no:cacheprovider")
+PLUGINS = ("-p", "antdrive.cli.testing.plugin", "-p", "tests.audit.suite_runs", "-p", "no:cacheprovider")
 
 #: What came out of each test, by its name.
 Tests: TypeAlias = dict[str, dict[str, Any]]
