@@ -1,4 +1,4 @@
-"""Hostile files through the command line: `python -m benchmarks.hostile [KIND ...] [--flips N] [--files N] [--seed N]`.
+"""Hostile files through the command line: `python -m tests.audit.hostile [KIND ...] [--flips N] [--files N] [--seed N]`.
 
 Each case damages a genuine file of one kind (flipped bytes, or one of `DAMAGES`) and gives it to a command of `KINDS` in a
 process of its own. Counted are tracebacks and internal errors, hangs (over 5 s of processor time, or 20 s of any), more than
@@ -29,7 +29,7 @@ from benchmarks.markdown import command_line, print_table
 SMALLEST = ("world result --flips 2 --files 4",)
 CPU, WALL, MEMORY = 5, 20.0, 2 << 30  # [s], [s], bytes
 WRONG = ("traceback", "hang", "memory", "control character")
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 
 Generator = np.random.Generator
 

@@ -13,7 +13,7 @@ import numpy as np
 from antdrive.sim import Rollout
 from antdrive.sim.log.record import LABELS, PROOFS, Proof
 from antdrive.sim.log.rollout import FORMS, NOISY, ROWS
-from benchmarks.forged_logs import KINDS, Array, Log
+from tests.audit.forged_logs import KINDS, Array, Log
 
 Generator = np.random.Generator
 

@@ -1,12 +1,11 @@
-"""Suite runs in other processes, for `benchmarks.planted` and `benchmarks.suites`.
+"""Suite runs in other processes, for `tests.audit.planted`.
 
-As a pytest plugin, `-p benchmarks.suite_runs`, it writes each test's result to the file named by ANTDRIVE_RUN, shuffles the
-tests with the seed in ANTDRIVE_SHUFFLE, and runs each test ANTDRIVE_TIMES times.
+As a pytest plugin, `-p tests.audit.suite_runs`, it writes each test's result to the file named by ANTDRIVE_RUN, and shuffles the
+tests with the seed in ANTDRIVE_SHUFFLE.
 """
 
 from __future__ import annotations
 
-import copy
 import json
 import os
 import random
@@ -18,60 +17,42 @@ from typing import Any, TypeAlias
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "regression_suite"
-PLUGINS = ("-p", "antdrive.testing.plugin", "-p", "benchmarks.suite_runs", "-p", "no:cacheprovider")
+PLUGINS = ("-p", "antdrive.testing.plugin", "-p", "tests.audit.suite_runs", "-p", "no:cacheprovider")
 
 #: What came out of each test, by its name.
 Tests: TypeAlias = dict[str, dict[str, Any]]
 
-_ROUNDS: list[Tests] = []  # the first results of all tests, the second ones, and so on
+_RESULTS: Tests = {}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items += [_twin(item) for _ in range(int(os.environ.get("ANTDRIVE_TIMES", "1")) - 1) for item in tuple(items)]
     seed = os.environ.get("ANTDRIVE_SHUFFLE")
     if seed:
         random.Random(int(seed)).shuffle(items)
 
 
-def _twin(item: pytest.Item) -> pytest.Item:
-    """Another item for the same test; pytest would not set up and tear down the same one between two turns."""
-    twin = copy.copy(item)
-    twin.stash, twin.user_properties = pytest.Stash(), []
-    if isinstance(twin, pytest.Function):
-        twin._initrequest()
-    return twin
-
-
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     if report.when == "call" or report.failed:
         facts = {name.removeprefix("drive."): value for name, value in report.user_properties}
-        _keep(report.nodeid.rpartition("/")[2], {
-            "passed": report.passed, "message": report.longreprtext, "digest": facts.get("digest", ""),
-            "outcome": facts.get("outcome", ""), "results": facts.get("results", ""),
-        })  # fmt: skip
+        _RESULTS[report.nodeid.rpartition("/")[2]] = {
+            "passed": report.passed,
+            "message": report.longreprtext,
+            **{key: facts.get(key, "") for key in ("digest", "outcome", "results")},
+        }
 
 
 def pytest_collectreport(report: pytest.CollectReport) -> None:
     if report.failed:
-        facts = {"message": report.longreprtext, "digest": "", "outcome": "", "results": ""}
-        _keep(report.nodeid, {"passed": False, **facts})
-
-
-def _keep(name: str, facts: dict[str, Any]) -> None:
-    """Put a test's result into the first round that has none of this test."""
-    for tests in _ROUNDS:
-        if name not in tests:
-            tests[name] = facts
-            return
-    _ROUNDS.append({name: facts})
+        facts = dict.fromkeys(("digest", "outcome", "results"), "")
+        _RESULTS[report.nodeid] = {"passed": False, "message": report.longreprtext, **facts}
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     path = os.environ.get("ANTDRIVE_RUN")
     if path and not hasattr(session.config, "workeroutput"):
-        Path(path).write_text(json.dumps(_ROUNDS))
+        Path(path).write_text(json.dumps(_RESULTS))
 
 
 def with_pytest(
@@ -86,37 +67,15 @@ def with_pytest(
         env: variables to set
         cwd: the working directory; by default the folder
     """
-    (tests,) = rounds_with_pytest(folder, *words, flags=flags, env=env, cwd=cwd)
-    return tests
-
-
-def rounds_with_pytest(
-    folder: Path,
-    *words: str,
-    times: int = 1,
-    flags: Sequence[str] = (),
-    env: Mapping[str, str] | None = None,
-    cwd: Path | None = None,
-) -> list[Tests]:
-    """Run each test several times in one process. Return the results of each round.
-
-    Args:
-        folder: holds the suites
-        words: further words for pytest
-        times: how often each test is run
-        flags: for the interpreter
-        env: variables to set
-        cwd: the working directory; by default the folder
-    """
     out = folder / "tests.json"
     out.unlink(missing_ok=True)
     command = [sys.executable, *flags, "-m", "pytest", "-q", *PLUGINS, "--drive-film=never", *words]
-    env = environment(out, {**(env or {}), "ANTDRIVE_TIMES": str(times)})
+    env = environment(out, env)
     done = subprocess.run(command, cwd=cwd or folder, env=env, capture_output=True, text=True, check=False)
     if not out.exists():
         raise RuntimeError(done.stdout[-2000:] + done.stderr[-2000:])
     found = json.loads(out.read_text())
-    assert isinstance(found, list)
+    assert isinstance(found, dict)
     return found
 
 

@@ -1,9 +1,9 @@
-"""Resuming: `python -m benchmarks.resuming` kills `antdrive sweep` at random moments and resumes it.
+"""Resuming: `python -m tests.audit.resuming` kills `antdrive sweep` at random moments and resumes it.
 
 A quarter of the kills falls into the first two seconds of the process, a quarter into the first two of its folder, the rest
 anywhere. Three of four are SIGKILL to the whole process group; the others are SIGTERM. The same command then resumes, and its
-folder is compared with that of an uninterrupted campaign. `--results FILE` makes the benchmark itself resumable; other
-benchmarks use its JSONL files, too.
+folder is compared with that of an uninterrupted campaign. `--results FILE` makes the audit itself
+resumable.
 
 - refused: the second command failed
 - lost, double: finished runs that the second command repeated, and those with two rows
@@ -23,14 +23,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from antdrive.runs.campaigns import canonical_bytes, read_results
 from antdrive.runs.campaigns.store import results_in
 from antdrive.worlds import Disc, Task, World, save_task
-from benchmarks.markdown import command_line, print_table
+from benchmarks.markdown import append_line, command_line, print_table, read_lines
 
 SMALLEST = ("--kills 1",)
 RUNS = 12
@@ -38,41 +37,6 @@ EARLY = 2.0  # [s]
 GRACE = 10.0  # longest time for processes to end [s]
 FAULTS = ("refused", "lost", "double", "other", "left", "orphans", "silent")
 WINDOWS = ("process", "folder", "any", "any")
-
-
-def read_lines(path: Path | None) -> list[dict[str, Any]]:
-    """Return the objects of a file, ignoring a truncated last line; none without a file.
-
-    Args:
-        path: the file; None: there is none
-    """
-    if path is None or not path.exists():
-        return []
-    text = path.read_text(encoding="utf-8")
-    whole, _, cut = text.rpartition("\n")
-    if cut:  # the process was killed while it wrote
-        path.write_text(whole + "\n" if whole else "", encoding="utf-8")
-    return [json.loads(line) for line in whole.splitlines()]
-
-
-def append_line(path: Path | None, value: Mapping[str, Any]) -> None:
-    """Append an object to a file.
-
-    Args:
-        path: the file; None: nothing is written
-        value: the object
-    """
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(value) + "\n")
-
-
-def current_commit() -> str:
-    """Return antdrive's commit; empty without one."""
-    command = ["git", "rev-parse", "--short", "HEAD"]
-    done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
-    return done.stdout.strip()
 
 
 def sweep_of(folder: Path) -> list[str]:

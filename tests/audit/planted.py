@@ -1,4 +1,4 @@
-"""Detection of planted faults by the example's suite: `python -m benchmarks.planted [--only NAME ...]`.
+"""Detection of planted faults by the example's suite: `python -m tests.audit.planted [--only NAME ...]`.
 
 Faults are planted, one at a time, in a copy of `examples/regression_suite` or in the objects of a process that runs its
 tests. Each must fail a test. After a contact, or a clearance below the baseline by more than the tolerance, the message must
@@ -25,7 +25,7 @@ import numpy as np
 import yaml
 
 from benchmarks.markdown import command_line, print_table
-from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, with_check, with_pytest
+from tests.audit.suite_runs import EXAMPLE, PLUGINS, Tests, environment, with_check, with_pytest
 
 Edit = Callable[[Path], None]
 
@@ -284,7 +284,7 @@ def in_fork(folder: Path, patch: Callable[[], None] | None) -> Tests:
     process = multiprocessing.get_context("fork").Process(target=work)
     process.start()
     process.join()
-    (found,) = json.loads(out.read_text())  # one round
+    found = json.loads(out.read_text())
     assert isinstance(found, dict)
     return found
 

@@ -1,6 +1,6 @@
-"""Refused genuine drives and accepted forgeries by kind of drive: `python -m benchmarks.genuine [--count N] [--seed S]`.
+"""Refused genuine drives and accepted forgeries by kind of drive: `python -m tests.audit.genuine [--count N] [--seed S]`.
 
-Kinds are those of `benchmarks.kinds`. Each drive is certified, and its folder verified, also with its world and robot. Then
+Kinds are those of `tests.audit.kinds`. Each drive is certified, and its folder verified, also with its world and robot. Then
 values of its log or its `result.json` are forged, one at a time, and the digest renewed. Plain `verify`, or
 `--world --robot`, must refuse each, as declared. A drive that is refused, and a forgery that is accepted, is printed with the
 command that repeats it. Contacts, and drives within 2 mm of one, are no refusals.
@@ -26,10 +26,10 @@ from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import Proof
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.verifying import verify_log
-from benchmarks.forged_fields import ENTRIES, POOL, another, forgery_of, level_of
-from benchmarks.forged_logs import KINDS, Log
-from benchmarks.kinds import CROSSED, DriveKind, crossed, scenario
 from benchmarks.markdown import command_line, print_table
+from tests.audit.forged_fields import ENTRIES, POOL, another, forgery_of, level_of
+from tests.audit.forged_logs import KINDS, Log
+from tests.audit.kinds import CROSSED, DriveKind, crossed, scenario
 
 SMALLEST = ("--count 4",)
 CLAIMED = (
@@ -159,7 +159,8 @@ def main() -> None:
             log = done.rollout
             assert log is not None
             rng = np.random.default_rng([chosen.seed, number, 1])
-            said = f"python -m benchmarks.genuine {' '.join([*chosen.words, f'--seed {chosen.seed} --first {number} --count 1'])}"
+            again = f"--seed {chosen.seed} --first {number} --count 1"
+            said = f"python -m tests.audit.genuine {' '.join([*chosen.words, again])}"
             row = rows[tuple(kind[name] for name in CROSSED)]
             row["drives"] += 1
             row[log.record.shape] += 1

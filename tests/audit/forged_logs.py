@@ -1,4 +1,4 @@
-"""Forged and broken logs for `benchmarks.forgeries`. Each changes a genuine log and updates its digest."""
+"""Forged and broken logs for `tests.audit.forgeries`. Each changes a genuine log and updates its digest."""
 
 from __future__ import annotations
 

@@ -8,9 +8,9 @@ import pytest
 
 from antdrive.sim import run
 from antdrive.sim.settings import SETTINGS
-from benchmarks.forged_fields import POOL
-from benchmarks.genuine import accepted, forged, refusals
-from benchmarks.kinds import CROSSED, STILL, axes, crossed, scenario
+from tests.audit.forged_fields import POOL
+from tests.audit.genuine import accepted, forged, refusals
+from tests.audit.kinds import CROSSED, STILL, axes, crossed, scenario
 from tests.records import COARSE
 
 #: Kinds that have every choice between them.

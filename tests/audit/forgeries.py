@@ -1,7 +1,7 @@
-"""Detection of forged and broken logs by check: `python -m benchmarks.forgeries [WORD ...] [--count N] [--seed S]`.
+"""Detection of forged and broken logs by check: `python -m tests.audit.forgeries [WORD ...] [--count N] [--seed S]`.
 
-A forger changes a genuine log and updates its digest, so the digest detects nothing here. `benchmarks.forged_fields` holds an
-entry for every array and every key of the record, `benchmarks.forged_logs` forgeries written by hand. Draws are forgeries by
+A forger changes a genuine log and updates its digest, so the digest detects nothing here. `tests.audit.forged_fields` holds an
+entry for every array and every key of the record, `tests.audit.forged_logs` forgeries written by hand. Draws are forgeries by
 random amounts in random drives of `genuine_drives`. The checks are those of `antdrive verify`, cheapest first:
 
 - load: the file is not a log, or its arrays and record are invalid
@@ -39,10 +39,10 @@ from antdrive.sim.log.record import PROOFS, DriveRecord, Proof, differences, pla
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.rerun import mismatches, rerun
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
-from benchmarks.forged_fields import ENTRIES, POOL, forgery_of, level_of
-from benchmarks.forged_logs import KINDS, LEVELS, Kind, Log
-from benchmarks.kinds import DriveKind, crossed, scenario
 from benchmarks.markdown import command_line, print_table
+from tests.audit.forged_fields import ENTRIES, POOL, forgery_of, level_of
+from tests.audit.forged_logs import KINDS, LEVELS, Kind, Log
+from tests.audit.kinds import DriveKind, crossed, scenario
 
 CRASHED = "crash"  # in place of a level: the check raised an exception
 BY_HAND = 8  # drives of `genuine_drives`
@@ -83,7 +83,7 @@ def genuine_drives() -> dict[str, Rollout]:
 
 
 def more_drives(kinds: Sequence[DriveKind], seed: int = 0) -> dict[str, Rollout]:
-    """Random drives of some kinds of `benchmarks.kinds`, each the first that has a log."""
+    """Random drives of some kinds of `tests.audit.kinds`, each the first that has a log."""
     found = {}
     for number, kind in enumerate(kinds):
         logs = (
@@ -307,7 +307,7 @@ def main() -> None:
             if accepted(finding):
                 words = " ".join([*map(repr, chosen.kinds), f"--seed {chosen.seed} --first {number} --count 1"])
                 print(
-                    f"- ACCEPTED: {finding.kind} in {finding.drive} {finding.why[:150]}: python -m benchmarks.forgeries {words}",
+                    f"- ACCEPTED: {finding.kind} in {finding.drive} {finding.why[:150]}: python -m tests.audit.forgeries {words}",
                     flush=True,
                 )
     print()

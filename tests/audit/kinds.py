@@ -6,7 +6,6 @@ without choices needs an entry in `VALUES`.
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 from collections.abc import Mapping
@@ -16,11 +15,12 @@ import numpy as np
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import PLANNERS
-from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot
+from antdrive.robots import Avoidance, PurePursuit, RobotSpec
 from antdrive.sim import Perception, ReplanPolicy, Scenario
 from antdrive.sim.policy import PerceptionKind
 from antdrive.sim.settings import SETTINGS, DeclaredSetting
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
+from benchmarks.drives import with_lidar
 
 DriveKind: TypeAlias = Mapping[str, Any]  # the values of some settings; may name a planner
 
@@ -102,12 +102,6 @@ def _drawn(kind: DriveKind, rng: np.random.Generator) -> Scenario:
 
 def _value(choices: tuple[Any, ...], rng: np.random.Generator) -> Any:
     return choices[0] if rng.integers(RARELY) else choices[rng.integers(len(choices))]
-
-
-def with_lidar(name: str) -> RobotSpec:
-    """Load a robot of the catalogue; one without a lidar gets the jackal's."""
-    spec = load_robot(name)
-    return spec if spec.lidar is not None else dataclasses.replace(spec, lidar=load_robot("jackal").lidar)
 
 
 def task_of(rng: np.random.Generator, robot: RobotSpec, *, moving: bool) -> Task:

@@ -1,7 +1,7 @@
-"""Drives in held-out worlds: `python -m benchmarks.held_out [--drives 10000] [--jobs 2] [--seed S]`.
+"""Drives in held-out worlds: `python -m tests.audit.held_out [--drives 10000] [--jobs 2] [--seed S]`.
 
 World, planner, robot, noise and smoothing of drive n follow from n and the seed. Planners alternate over every kind of
-world. Each drive is certified, and a second audit (`benchmarks.second_audit`), which shares no code with the certificate,
+world. Each drive is certified, and a second audit (`tests.audit.second_audit`), which shares no code with the certificate,
 recomputes the minimum clearance.
 
 Worlds: forests by han2007's rule; thickets of 20 to 60 thinner cylinders; fields by BARN's cellular automaton; halls with
@@ -37,11 +37,11 @@ from antdrive.sim.settings import SMOOTHINGS
 from antdrive.worlds import Disc, Task, World, generate
 from antdrive.worlds.files.world_file import save_task
 from benchmarks.dynamic import random_task
-from benchmarks.markdown import command_line, table
-from benchmarks.second_audit import Least, least_clearance
+from benchmarks.markdown import append_line, command_line, read_lines, table
+from tests.audit.second_audit import Least, least_clearance
 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same values, read ten times faster
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 RESULTS = Path("out/held_out")
 SMALLEST = ("--drives 2 --jobs 1 --margins fixed",)
 STREAM = 0x48454C44  # keeps these worlds apart from those of all other seeds
@@ -266,14 +266,8 @@ def failures(results: Sequence[dict[str, Any]]) -> Iterator[str]:
             continue
         why = "; ".join([*r.get("wrong", []), *r.get("problems", []), *([r["reason"]] if r["reason"] else [])])
         what = f"{r['kind']}, {r['robot']}, noise {r['noise']:g}, {r['smoothing']}, {r['planner']}"
-        again = f"python -m benchmarks.held_out --seed {r['seed']} --margins {r['margins']} --only {r['n']}"
+        again = f"python -m tests.audit.held_out --seed {r['seed']} --margins {r['margins']} --only {r['n']}"
         yield f"- {what}: {r['outcome']}{f' ({why})' if why else ''}: `{again}`"
-
-
-def results_of(path: Path) -> list[dict[str, Any]]:
-    """Read a results file, ignoring a truncated last line."""
-    lines = path.read_text().splitlines(keepends=True) if path.exists() else []
-    return [json.loads(line) for line in lines if line.endswith("}\n")]
 
 
 def main() -> None:
@@ -291,19 +285,16 @@ def main() -> None:
         print(json.dumps(drive(given.only, given.seed, given.margins), indent=1))
         return
     path = given.results or RESULTS / f"{given.margins}-{given.seed}.jsonl"
-    path.parent.mkdir(parents=True, exist_ok=True)
     wanted = range(given.first, given.first + given.drives)
-    results = {r["n"]: r for r in results_of(path)}
-    path.write_text("".join(json.dumps(r) + "\n" for r in results.values()))
+    results = {r["n"]: r for r in read_lines(path)}
     todo = [n for n in wanted if n not in results]
-    with Progress() as bar, path.open("a") as file:
+    with Progress() as bar:
         task = bar.add_task("drives", total=len(wanted), completed=len(wanted) - len(todo))
         made = functools.partial(drive, seed=given.seed, margins=given.margins)
         with Pool(processes_for(given.jobs)) as pool:
             for r in pool.results(made, todo, in_order=False):
                 results[r["n"]] = r
-                file.write(json.dumps(r) + "\n")
-                file.flush()
+                append_line(path, r)
                 bar.advance(task)
     chosen = [results[n] for n in wanted]
     rows = (
