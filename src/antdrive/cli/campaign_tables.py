@@ -112,7 +112,7 @@ def campaign_folders(words: Sequence[str], context: typer.Context, query: Campai
 
 def compare_campaigns(folders: Sequence[Path], planners: Sequence[str], query: CampaignQuery, json: bool) -> None:
     """Print each planner's success and the comparison of each pair."""
-    from antdrive.views.pages.campaign_report import summarise_campaign
+    from antdrive.views.pages.report import summarise_campaign
 
     summary = summarise_campaign(folders, planners=planners, strict=True, **query.arguments)
     show(json, summary.as_dict(), _tables(summary))
@@ -133,7 +133,7 @@ def report_campaigns(
     folders: Sequence[Path], out: Path | None, json: bool, query: CampaignQuery, figures: Path | None, **given: Any
 ) -> None:
     """Write the report of one or several campaigns."""
-    from antdrive.views.pages.campaign_report import report_campaign
+    from antdrive.views.pages.report import report_campaign
 
     files = report_campaign(folders, out, figures=figures, **given, **query.arguments)
     size = sum(path.stat().st_size for path in files)

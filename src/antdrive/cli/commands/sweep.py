@@ -109,7 +109,7 @@ def sweep(
         results = make_runs(requested, out, expansion=expansion, progress=progress, notify=print_error, **rest)
     files: list[str] = []
     if report is not None:
-        from antdrive.views.pages.campaign_report import report_campaign
+        from antdrive.views.pages.report import report_campaign
 
         files = [str(path) for path in report_campaign(out, report)]
     facts = {
@@ -129,7 +129,7 @@ def sweep(
 def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
     """Raise an error about options without effect."""
     if report is not None:
-        from antdrive.views.pages.campaign_report import check_suffix
+        from antdrive.views.pages.report import check_suffix
 
         check_suffix(report)
         if dry_run:
