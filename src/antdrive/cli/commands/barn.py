@@ -167,7 +167,7 @@ def _lines(rows: "Sequence[BarnLine]", known: "BarnLine | None", price: "Price |
     listed = [*rows, *([dataclasses.replace(known, world="all, with the map")] if known else [])]
     yield from table(HEADS, (line.cells for line in listed))
     yield f"score: {FORMULA}"
-    yield "exact score: OT = length of the exact shortest path / 2 m/s"
+    yield "exact score: T = length of the exact shortest path / 2 m/s in place of OT"
     yield ""
     if price:
         yield price.sentence
