@@ -10,7 +10,8 @@ import typer
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import format_size
-from antdrive.cli.console import file_lines, show, table
+from antdrive.base.tables import table
+from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import option
 
 if TYPE_CHECKING:

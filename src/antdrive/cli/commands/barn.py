@@ -8,10 +8,11 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
+from antdrive.base.tables import table
 from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.campaign_options import OPTIONS
-from antdrive.cli.console import bar, campaign_bar, print_error, show, table
+from antdrive.cli.console import bar, campaign_bar, print_error, show
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults
 from antdrive.sim.settings import SETTINGS

@@ -1,1 +1,1 @@
-"""Where installations made before the pytest plugin moved look for it; it leaves once they are made anew."""
+"""Former name of the pytest plugin, which earlier installations load; it leaves once they are renewed."""
