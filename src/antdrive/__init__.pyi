@@ -22,6 +22,8 @@ from .robots.spec import RobotSpec as RobotSpec
 from .runs.campaigns.sweeping import sweep as sweep
 from .runs.comparing import Comparison as Comparison
 from .runs.comparing import compare as compare
+from .sim.fitting import Fit as Fit
+from .sim.fitting import fit as fit
 from .sim.log.certificate import Certificate as Certificate
 from .sim.log.certificate import certify as certify
 from .sim.log.metrics import METRICS as METRICS

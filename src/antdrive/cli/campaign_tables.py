@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from antdrive.base.errors import InputError
-from antdrive.cli.console import show, table
+from antdrive.base.tables import table
+from antdrive.cli.console import show
 from antdrive.cli.options import option
 
 if TYPE_CHECKING:

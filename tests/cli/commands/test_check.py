@@ -11,8 +11,8 @@ import pytest
 
 from antdrive import Run, run
 from antdrive.cli.commands import check
-from antdrive.cli.testing import evaluation
 from antdrive.runs.suites import Baseline
+from antdrive.testing import evaluation
 from antdrive.views.artefacts import Results
 from antdrive.views.figures import run_figures
 
@@ -288,6 +288,6 @@ def test_a_process_for_each_core_that_may_be_used(cores, asked, started, monkeyp
 
     monkeypatch.setattr("joblib.cpu_count", lambda: cores)
     monkeypatch.setattr("antdrive.runs.suites.select", lambda words, only: [case] * 10)
-    monkeypatch.setattr("antdrive.cli.testing.check_cases", check_cases)
+    monkeypatch.setattr("antdrive.testing.check_cases", check_cases)
     assert check.drive_suites(["a"], None, asked, "", Results(tmp_path), json=True) == []
     assert found == [started]

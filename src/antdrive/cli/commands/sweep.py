@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
+from antdrive.base.tables import table
 from antdrive.cli import options
 from antdrive.cli.campaign_options import campaign_from
-from antdrive.cli.console import campaign_bar, print_error, show, table
+from antdrive.cli.console import campaign_bar, print_error, show
 from antdrive.cli.exits import SUCCEEDED
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults
