@@ -91,7 +91,7 @@ class Run:
         log = self._driven()
         if name not in METRICS:
             raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
-        return METRICS[name](log.rollout)
+        return log.metrics[name]
 
     def _driven(self) -> LoggedRun:
         if self.logged is None:

@@ -273,7 +273,7 @@ def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluatio
             for name in compared(demands):
                 if math.isfinite(baseline.metric(name)):
                     _compare(name, run.rollout, baseline, demands, faults, gains)
-                elif math.isfinite(METRICS[name](run.rollout)):
+                elif math.isfinite(run.metric(name)):
                     missing.append(name)
             faults += _line_faults(run.rollout, baseline, demands)
             if missing:
@@ -301,7 +301,7 @@ def unmet_demands(run: Run, demands: Demands) -> Iterator[str]:
     for bound in demands.bounds:
         if run.rollout is None:
             yield f"{bound.metric}: the robot did not drive, expected {bound.sign} {bound.value:g}"
-        elif not bound.holds(measured := METRICS[bound.metric](run.rollout)):
+        elif not bound.holds(measured := run.metric(bound.metric)):
             yield f"{bound.metric}: {measured:.6g}, expected {bound.sign} {bound.value:g}{_place(bound.metric, run.rollout)}"
 
 
