@@ -17,13 +17,7 @@ def export(
     out: Annotated[Path, option("PATH", "Output: .mcap file or new folder.")],
     to: Annotated[str, option("KIND", "Format: mcap, rosbag2 or csv.", "--to")] = "mcap",
     force: Annotated[bool, flag("Replace an existing .mcap file and layout.", "--force")] = False,
-    scans: Annotated[
-        bool,
-        flag(
-            "Simulate scans that the log lacks.",
-            "--scans/--no-scans",
-        ),
-    ] = True,
+    scans: Annotated[bool, flag("Simulate scans that the log lacks.", "--scans/--no-scans")] = True,
     urdf: Annotated[
         Path | None,
         option("FILE", "The robot's .urdf or .xacro, for description, frames and joints.  [default: generated]"),
