@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from antdrive.views.artefacts import Films, Results
 
 Suites = Annotated[
-    list[str],
-    argument("SUITE", "Suite (*.drive.yaml), test_*.py, folder, SUITE::scenario[seed] or FILE.py::test."),
+    list[str], argument("SUITE", "Suite (*.drive.yaml), test_*.py, folder, SUITE::scenario[seed] or FILE.py::test.")
 ]
 Only = Annotated[str | None, option("PATTERN", "Run only matching scenarios, such as 'aisle-*'.")]
 ResultsFolder = Annotated[Path | None, option("FOLDER", "Folder for logs, figures, films.  [default: user cache]")]
