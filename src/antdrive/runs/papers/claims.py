@@ -179,7 +179,8 @@ def _difference(claim: Claim, runs: RunsByArm) -> Measured:
     first, second, world = _paired(claim, runs)
     difference = np.round(first - second, 9)  # removes rounding errors
     value, interval = _median(difference, world)
-    why = f"{_counts(difference)}; Wilcoxon's p {wilcoxon(difference):.2g}"
+    less, equal, more = (int(np.sum(sign)) for sign in (difference < 0, difference == 0, difference > 0))
+    why = f"{less} less, {equal} equal, {more} more; Wilcoxon's p {wilcoxon(difference):.2g}"
     ours = f"median difference {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"
     return Measured(value, interval, len(difference), ours, why, _never(first, second))
 
@@ -403,11 +404,6 @@ def _undecided(measured: Measured, claim: Claim) -> str:
         return words
     more = f"about {times:.1f} times as many maps and seeds would decide"
     return f"{words}; {more if times < REPEATABLE else 'the difference is small beside the spread of the runs'}"
-
-
-def _counts(difference: Floats) -> str:
-    less, equal, more = (int(np.sum(sign)) for sign in (difference < 0, difference == 0, difference > 0))
-    return f"{less} less, {equal} equal, {more} more"
 
 
 def _never(first: Floats, second: Floats) -> str:
