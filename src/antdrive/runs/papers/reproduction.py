@@ -42,7 +42,6 @@ from antdrive.runs.papers.claims import (
     evaluate,
     runs_available,
     runs_needed,
-    verdict_cells,
     verdict_facts,
 )
 from antdrive.runs.papers.experiment import Experiment
@@ -231,7 +230,9 @@ def reproduce(
     files = {
         "table": _write_table(HEADS, map(row_cells, rows), folder / "table.md", NOTE),
         "csv": _write_csv([vars(row) for row in rows], folder / "table.csv"),
-        "claims": _write_table(VERDICT_HEADS, map(verdict_cells, verdicts), folder / "claims.md"),
+        "claims": _write_table(
+            VERDICT_HEADS, ([row[h] for h in VERDICT_HEADS] for row in claims), folder / "claims.md"
+        ),
         "claims csv": _write_csv(
             [row | {"settings": json.dumps(row["settings"])} for row in claims], folder / "claims.csv"
         ),
