@@ -83,14 +83,13 @@ def show_world(
     from antdrive.robots.default_margin import LEAST
     from antdrive.sim import Scenario, plan
     from antdrive.sim.driving.routes import FINE
-    from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
+    from antdrive.worlds import load_tasks, rasterise, task_to_dict
     from antdrive.worlds.coverage import coverage
 
     margin = LEAST if settings["margin"] is None else settings["margin"]
     if margin == "auto":
         raise InputError("--margin auto: applies to drives only; give a number of metres")
-    given, spec = ends.of(world), load_robot(robot)
-    shown = load_task(given) if isinstance(given, str) else given
+    shown, spec = ends.task_of(world), load_robot(robot)
     known = {name: load_robot(name) for name in list_robots()}
     starts = {each.name: overlap_at(shown.world, each, shown.start) for each in (*known.values(), spec)}
     grids = {"disc": rasterise(shown.world, shown.cell, spec.radius + margin)}

@@ -3,8 +3,8 @@ from .demands import Bound as Bound
 from .demands import Demands as Demands
 from .evaluation import Evaluation as Evaluation
 from .evaluation import evaluate as evaluate
-from .names import select as select
 from .scenarios import scenario_of as scenario_of
+from .scenarios import select as select
 from .strategies import tasks as tasks
 from .strategies import worlds as worlds
 from .suite import SuiteCase as SuiteCase

@@ -18,8 +18,8 @@ from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
-from antdrive.sim.repeating import command_of
 from antdrive.sim.verifying import false_claims, logged_settings, read_result
+from antdrive.sim.written import command_of
 from antdrive.views.pages.rendering import NONE, TextTable, number, shown
 
 LONGEST_COMMAND = 4000  # characters
@@ -270,7 +270,7 @@ def log_facts(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFact
     except ValueError as error:
         raise input_error(name, str(error)) from None
     claims = tuple(shown(claim) for claim in false_claims(result, rollout, certificate, metrics, digest))
-    command, settings = shown(command_of(rollout) or "", LONGEST_COMMAND), logged_settings(rollout)
+    command, settings = shown(command_of(rollout.record) or "", LONGEST_COMMAND), logged_settings(rollout)
     return LogFacts(rollout.record, certificate, metrics, sights, len(rollout.scans), digest, settings, claims, command)
 
 
