@@ -108,7 +108,7 @@ def drive_suites(
 
     cases = select(suites, only)
     for case in cases:
-        if case.given.get("margin") == "auto":  # calibrate once, with a bar, before processes start
+        if case.written.settings.get("margin") == "auto":  # calibrate once, with a bar, before processes start
             with suppress(InputError, FieldError):  # reported as the test's failure
                 scenario_of(case, with_chosen_margin)
     processes = min(jobs or cores(), len(cases))
