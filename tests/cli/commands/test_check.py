@@ -119,8 +119,8 @@ def test_a_broken_test_hides_no_other(antdrive, suite, jobs, small_run):
         "schema: 1\ndefaults: {planner: astar, world: small.yaml}\nscenarios:\n"
         "  merged: {}\n"
         "  fine-cells: {cell: 1.0e-9, baseline: false}\n"
-        "  raises: {planner: {file: mine.py, name: Raises}}\n"
-        "  none: {planner: {file: mine.py, name: Wrong}, baseline: false}\n"
+        "  raises: {planner: 'mine.py:Raises'}\n"
+        "  none: {planner: 'mine.py:Wrong', baseline: false}\n"
         "  good: {baseline: false}\n"
     )
     damaged = suite.parent / "baselines" / "a" / "merged-0.json"

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from antdrive.views.artefacts import Films, Results
 
 Suites = Annotated[
-    list[str],
-    argument("SUITE", "Suite (*.drive.yaml), test_*.py, folder, SUITE::scenario[seed] or FILE.py::test."),
+    list[str], argument("SUITE", "Suite (*.drive.yaml), test_*.py, folder, SUITE::scenario[seed] or FILE.py::test.")
 ]
 Only = Annotated[str | None, option("PATTERN", "Run only matching scenarios, such as 'aisle-*'.")]
 ResultsFolder = Annotated[Path | None, option("FOLDER", "Folder for logs, figures, films.  [default: user cache]")]
@@ -109,7 +108,7 @@ def drive_suites(
 
     cases = select(suites, only)
     for case in cases:
-        if case.given.get("margin") == "auto":  # calibrate once, with a bar, before processes start
+        if case.written.settings.get("margin") == "auto":  # calibrate once, with a bar, before processes start
             with suppress(InputError, FieldError):  # reported as the test's failure
                 scenario_of(case, with_chosen_margin)
     processes = min(jobs or cores(), len(cases))

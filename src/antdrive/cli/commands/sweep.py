@@ -151,7 +151,7 @@ def _size_lines(expansion: "Expansion", missing: int) -> Iterator[str]:
         plural = count != 1 or " " in name or name == "settings"
         return f"{count} {name if plural else name.removesuffix('s')}"
 
-    smoothings = dict.fromkeys(str(job.case.settings.fields["smoothing"]) for job in expansion.jobs)
+    smoothings = dict.fromkeys(str(job.case.resolved.columns["smoothing"]) for job in expansion.jobs)
     values = {"smoothing": f"smoothing {', '.join(smoothings)}"}
     yield " x ".join(values.get(name) or counted(name, count) for name, count in expansion.counts.items())
     omitted = f"; {expansion.duplicates} duplicate combinations omitted" if expansion.duplicates else ""

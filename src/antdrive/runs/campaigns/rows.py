@@ -6,6 +6,7 @@ part is written once, when the run ends (`run_row`, `failed_row`).
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
 from collections.abc import Mapping, Sequence
@@ -59,9 +60,9 @@ RESULT: Mapping[str, str] = {
 
 def grid_row(job: Job) -> dict[str, Any]:
     """Return the grid columns of a run."""
-    case, planner, robot, fields = job.case, job.case.planner, job.case.robot, job.case.settings.fields
+    case, planner, robot = job.case, job.case.planner, job.case.robot
     x0, y0, x1, y1 = case.place.task.world.bounds
-    margin = case.calibration.margin if case.calibration else case.margin
+    margin = case.calibration.margin if case.calibration else case.resolved.margin
     return {
         "key": job.key,
         "world": case.place.world,
@@ -74,11 +75,11 @@ def grid_row(job: Job) -> dict[str, Any]:
         "options": json.dumps(planner.options, sort_keys=True),
         "robot": robot.name,
         "robot_hash": robot.content,
-        **case.settings.columns,
+        **case.resolved.columns,
         "margin": None if margin == "auto" else float(margin),
-        "cell": float(fields["cell"] or case.place.task.cell),
+        "cell": float(case.written.settings.get("cell") or case.place.task.cell),
         "seed": job.seed,
-        "command": None if case.words is None else f"{case.words} --seed {job.seed}",
+        "command": dataclasses.replace(case.written, seed=job.seed).command(),
     }
 
 

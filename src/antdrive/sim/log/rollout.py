@@ -272,9 +272,9 @@ class Rollout:
         """SHA-256 of everything that a repetition must reproduce: the arrays, and the record without wall-clock times.
 
         For each array, in the order of this class, the hash takes the line "name dtype shape" and the bytes in C order;
-        then the record's JSON text, without `digest` and `times`.
+        then the record's JSON text, without `UNHASHED`.
         """
-        return self._hash(self.record.to_json(without=("digest", "times")))
+        return self._hash(self.record.to_json(without=UNHASHED))
 
     @property
     def drive_digest(self) -> str:
@@ -454,6 +454,8 @@ class Rollout:
 
 #: Names of the arrays that only lidar logs hold, in the order of the digest, after the others.
 SENSED = ("scans", "scan_rows", "seen", "tracks")
+#: Keys of the record that digests do not cover.
+UNHASHED = ("digest", "times", "written")
 #: Names of the arrays of every log, in the order of the digest.
 ARRAYS = tuple(name for name in FORMS if name not in SENSED)
 

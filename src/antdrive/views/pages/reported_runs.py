@@ -20,8 +20,8 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
-from antdrive.sim.repeating import command_of
 from antdrive.sim.verifying import false_claims, read_result
+from antdrive.sim.written import command_of
 from antdrive.views.pages.rendering import number, shown
 
 LONGEST_COMMAND = 4000  # characters
@@ -116,7 +116,7 @@ def logged_run(rollout: Rollout, result: Mapping[str, Any], name: str, folder: P
         "certified": certificate.certified,
         "bound_m": number(certificate.bound),
         "digest": rollout.digest,
-        "command": shown(command_of(rollout) or "", LONGEST_COMMAND) or None,
+        "command": shown(command_of(rollout.record) or "", LONGEST_COMMAND) or None,
     }
     return ReportedRun(
         folder,
