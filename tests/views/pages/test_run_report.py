@@ -293,14 +293,6 @@ def test_settings_that_differ_between_runs_get_columns(small_scenario, tmp_path)
     assert len({line.count("|") for line in lines}) == 1
 
 
-@pytest.mark.parametrize(
-    ("key", "value"), [("noise", 0.25), ("smoothing", "taut"), ("options", {"ants": 3}), ("seed", 9)]
-)
-def test_settings_that_contradict_the_log_are_reported(small_run, tmp_path, key, value):
-    write_run(small_run, tmp_path / "runs" / "a", **{key: value})
-    assert f"result.json: {key}: differs from the log, which says" in reported(tmp_path / "runs", tmp_path)
-
-
 def fake_run(folder, *, outcome="succeeded", **more):
     """Write the result.json of a claimed run, with a film beside it."""
     folder.mkdir(parents=True)
