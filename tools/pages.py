@@ -41,7 +41,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from antdrive.cli import console
+from antdrive.base import kernel_cache
 
 ROOT = Path(__file__).resolve().parents[1]
 MARK = re.compile(r"<!-- (file|added to|before|not run|run by): (.+?) -->\s*$")
@@ -54,7 +54,7 @@ TESTED = {
     "examples/bridges/README.md": "tests/examples/test_bridges.py",
     "examples/regression_suite/README.md": "tests/examples/test_regression_suite.py",
 }
-COMPILING = f"antdrive: {console.COMPILING}"  # printed only by the first commands of an installation
+COMPILING = f"antdrive: {kernel_cache.COMPILING}"  # printed only by the first commands of an installation
 WIDTH = "100"  # terminal width for commands
 LIMIT = 1200.0  # time limit of a page [s], against hangs; the slowest page takes one minute
 

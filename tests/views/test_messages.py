@@ -5,9 +5,8 @@ from antdrive.views.export.exporting import export
 from antdrive.views.figures.run_figures import then_and_now
 from antdrive.views.film.comparison_film import compare_film
 from antdrive.views.film.video import film, still
-from antdrive.views.pages.campaign_report import write_campaign_report
 from antdrive.views.pages.campaign_summary import summarise
-from antdrive.views.pages.run_report import write_report
+from antdrive.views.pages.report import write_campaign_report, write_report
 from tests.messages import check_messages
 from tests.records import changed
 from tests.runs.made_up_campaign import Skill, made_up_runs

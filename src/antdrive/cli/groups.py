@@ -123,6 +123,14 @@ class _Panelled(typer.core.TyperCommand):
             )
         return super().parse_args(ctx, args)
 
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; raise InputError for a wrong value, with its option."""
+        try:
+            return super().invoke(ctx)
+        except FieldError as error:
+            flag = next((one.opts[0] for one in self.params if one.name == error.key), error.key)
+            raise InputError(f"{flag}: {error.problem}") from error
+
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the arguments, then the options of each panel."""
         panels: dict[str, list[tuple[str, str]]] = {name: [] for name in ("Arguments", *PANELS, "Options")}

@@ -1,3 +1,5 @@
+from .fitting import Fit as Fit
+from .fitting import fit as fit
 from .log.certificate import Certificate as Certificate
 from .log.certificate import certify as certify
 from .log.metrics import METRICS as METRICS

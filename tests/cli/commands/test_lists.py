@@ -87,6 +87,10 @@ def test_show_reports_whether_a_robot_can_cross(antdrive, tmp_path):
     assert code == 0
     assert re.search("^passable +yes, for turtlebot with", out, re.MULTILINE)
     assert (tmp_path / "gate.png").exists()
+    margins = [
+        json.loads(antdrive("worlds", "show", "gate", "--noise", noise, "--json")[1])["margin"] for noise in "05"
+    ]
+    assert margins[0] == 0.03 < margins[1]
     assert not json.loads(antdrive("worlds", "show", "no-path", "--json")[1])["passable"]
     assert re.search(
         "^reason +no path for a disc of 0.21 m .*not even a point", antdrive("worlds", "show", "no-path")[1], re.M

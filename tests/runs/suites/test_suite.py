@@ -12,13 +12,13 @@ import pytest
 from antdrive import Disc, Outcome, Scenario
 from antdrive.base.errors import InputError
 from antdrive.cli.commands.run import run as command
-from antdrive.cli.testing import check_case
 from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.margins.choice import Calibration
 from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.suites import Baseline, load_suite, scenario_of, select
 from antdrive.runs.suites.scenarios import run_command
 from antdrive.runs.suites.suite import ScenarioEntry
+from antdrive.testing import check_case
 
 PLAIN = """schema: 1
 scenarios:

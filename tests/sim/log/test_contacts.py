@@ -164,7 +164,7 @@ def test_the_gap_to_a_disc_is_that_to_the_nearest_point_of_a_dense_outline(foot)
         if nearest > 0.01:  # the centre is outside of the rectangle
             expected = nearest - foot.rounding - radius
             assert _gap(foot, (x, y, yaw), centre, radius) == pytest.approx(expected, abs=3e-3)
-    assert _gap(foot, (1.0, 2.0, 0.7), (1.0, 2.0), 0.1) == pytest.approx(-foot.rounding - 0.1)
+    assert _gap(foot, (1.0, 2.0, 0.7), (1.0, 2.0), 0.1) == pytest.approx(-foot.depth(0.0, 0.0) - 0.1)
 
 
 def test_the_gap_to_a_disc_is_that_to_the_nearest_edge_of_a_polygon():

@@ -11,10 +11,10 @@ from hypothesis import given
 from antdrive.base.errors import InputError
 from antdrive.runs.statistics.intervals import Interval
 from antdrive.runs.statistics.run_table import RunTable
-from antdrive.views.pages.campaign_report import write_campaign_report
 from antdrive.views.pages.campaign_summary import headline, measure_title, summarise
 from antdrive.views.pages.quotes import disagreements
 from antdrive.views.pages.rendering import percent, percents, probability, short
+from antdrive.views.pages.report import write_campaign_report
 from antdrive.views.pages.tables import all_cells, latex_text, outcome_cells, pair_cells, success_cells
 from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
 
@@ -165,8 +165,9 @@ def test_outcomes_are_counted_by_planner(summary):
 
 def test_the_headline_favours_no_planner_with_fewer_or_with_more_counted_runs():
     columns = made_up_columns({"A": Skill(1.0), "B": Skill(1.0, seeded=False)}, worlds=10, seeds=2)
-    tied = {words: value for value, words in headline(summarise(RunTable(columns), title="t", metrics=[]))}
-    assert tied["runs succeeded, over all planners"] == "40"
+    summary = summarise(RunTable(columns), title="t", metrics=[])
+    tied = {words: value for value, words in headline(summary.table, summary)}
+    assert tied["reached the goal, certified collision-free"] == "40 / 40"
     (best,) = (words for words in tied if words.startswith("succeeded with"))
     assert best == "succeeded with every planner (95 % over worlds: 72.2 to 100.0)"
     hard = [world >= "world-005" for world in columns["world"]]
@@ -174,7 +175,9 @@ def test_the_headline_favours_no_planner_with_fewer_or_with_more_counted_runs():
     columns["outcome"] = ["no_path" if one else "succeeded" for one in hard]
     kept = [k for k, planner in enumerate(columns["planner"]) if planner == "A" or not hard[k]]
     some = summarise(RunTable({n: [v[k] for k in kept] for n, v in columns.items()}), title="t", metrics=[], size=40)
-    assert [value for value, words in headline(some) if words.startswith("succeeded with every planner")] == ["100.0 %"]
+    assert [
+        value for value, words in headline(some.table, some) if words.startswith("succeeded with every planner")
+    ] == ["100.0 %"]
     assert (
         "Shares are over the 10 instances that every planner ran. Omitted runs of other instances: A 10." in some.notes
     )

@@ -8,10 +8,11 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
+from antdrive.base.tables import table
 from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.campaign_options import OPTIONS
-from antdrive.cli.console import bar, campaign_bar, print_error, show, table
+from antdrive.cli.console import bar, campaign_bar, print_error, show
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults
 from antdrive.sim.settings import SETTINGS
@@ -167,7 +168,7 @@ def _lines(rows: "Sequence[BarnLine]", known: "BarnLine | None", price: "Price |
     listed = [*rows, *([dataclasses.replace(known, world="all, with the map")] if known else [])]
     yield from table(HEADS, (line.cells for line in listed))
     yield f"score: {FORMULA}"
-    yield "exact score: OT = length of the exact shortest path / 2 m/s"
+    yield "exact score: T = length of the exact shortest path / 2 m/s in place of OT"
     yield ""
     if price:
         yield price.sentence

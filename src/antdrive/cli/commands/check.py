@@ -13,7 +13,7 @@ from antdrive.cli.options import argument, flag, option
 from antdrive.cli.scenario_options import with_chosen_margin
 
 if TYPE_CHECKING:
-    from antdrive.cli.testing.evaluation import CheckResult, Update
+    from antdrive.testing.evaluation import CheckResult, Update
     from antdrive.views.artefacts import Films, Results
 
 Suites = Annotated[
@@ -39,7 +39,7 @@ def check(
 
     Exit code 0: every drive meets its suite's expectations and is no worse than its baseline.
     """
-    from antdrive.cli.testing.session_summary import add_to_page, drives_in, properties, save_junit
+    from antdrive.testing.session_summary import add_to_page, drives_in, properties, save_junit
 
     outcomes, unused = drive_tests(tests, only, jobs, "", results, film, json=json)
     if junit is not None:
@@ -76,9 +76,9 @@ def drive_tests(
     json: bool,
 ) -> "tuple[list[CheckResult], list[str]]":
     """Drive and evaluate all named tests, and print each result; return the results and the unused baselines."""
-    from antdrive.cli.testing.python_tests import drive_python_tests, is_module
-    from antdrive.cli.testing.unused import unused_beside
     from antdrive.runs.suites.suite import SUFFIX
+    from antdrive.testing.python_tests import drive_python_tests, is_module
+    from antdrive.testing.unused import unused_beside
     from antdrive.views.artefacts import Films, Results, default_folder
     from antdrive.views.run_folder import check_folder
 
@@ -103,9 +103,9 @@ def drive_suites(
     suites: list[str], only: str | None, jobs: int | None, update: "Update", results: "Results", *, json: bool
 ) -> "list[CheckResult]":
     """Drive and evaluate the tests of suites with a progress bar, and print each result."""
-    from antdrive.cli.testing import check_cases
     from antdrive.runs.pool import cores
     from antdrive.runs.suites import scenario_of, select
+    from antdrive.testing import check_cases
 
     cases = select(suites, only)
     for case in cases:
@@ -133,9 +133,9 @@ def _print(result: "CheckResult") -> None:
 
 def _summarise(results: "list[CheckResult]", json: bool, unused: Sequence[str], *, strict: bool = False) -> int:
     """Print the number of passed tests and the unused baselines. Return the exit code of the worst test."""
-    from antdrive.cli.testing.evaluation import INTERNAL_ERROR as INTERNAL
-    from antdrive.cli.testing.evaluation import INVALID_INPUT as WRONG
-    from antdrive.cli.testing.session_summary import films_omitted, unused_lines
+    from antdrive.testing.evaluation import INTERNAL_ERROR as INTERNAL
+    from antdrive.testing.evaluation import INVALID_INPUT as WRONG
+    from antdrive.testing.session_summary import films_omitted, unused_lines
 
     failed = [result for result in results if not result.passed]
     worst = {WRONG: INVALID_INPUT, INTERNAL: INTERNAL_ERROR}

@@ -9,10 +9,11 @@ import typer
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, write_json
+from antdrive.base.tables import table
 from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, campaign_folders, compare_campaigns
-from antdrive.cli.console import file_lines, marked, planning, print_error, print_traceback, show, table
+from antdrive.cli.console import file_lines, marked, planning, print_error, print_traceback, show
 from antdrive.cli.entrants import check_worlds, entrants_of
 from antdrive.cli.exits import FAILED, SUCCEEDED
 from antdrive.cli.options import argument, option

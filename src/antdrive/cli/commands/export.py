@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-from antdrive.base.errors import FieldError, InputError
+from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import flag, option
@@ -60,9 +60,6 @@ def export_drive(
             arguments=dict(pair(word, "--arg") for word in arguments or ()),
             packages=checked_packages(dict(pair(word, "--package") for word in packages or ())),
         )
-    try:
-        files = export(log_at(rollout), to, out, replace=force, scans=scans, frames=frames)
-    except FieldError as error:
-        raise InputError(f"--{error.key}: {error.problem}") from None
+    files = export(log_at(rollout), to, out, replace=force, scans=scans, frames=frames)
     written = {("layout" if file.name.endswith(".foxglove.json") else to): str(file) for file in files}
     show(json, {"files": written}, file_lines(written))

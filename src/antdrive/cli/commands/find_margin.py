@@ -5,8 +5,9 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
+from antdrive.base.tables import table
 from antdrive.cli import options
-from antdrive.cli.console import planning, show, table
+from antdrive.cli.console import planning, show
 from antdrive.cli.options import argument, option
 from antdrive.cli.scenario_options import Ends, Setup, random_world
 

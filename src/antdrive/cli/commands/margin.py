@@ -3,8 +3,9 @@
 import dataclasses
 from typing import TYPE_CHECKING
 
+from antdrive.base.tables import table
 from antdrive.cli import options
-from antdrive.cli.console import show, table
+from antdrive.cli.console import show
 from antdrive.cli.parse import log_at
 
 if TYPE_CHECKING:

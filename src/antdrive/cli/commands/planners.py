@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from antdrive.base.checks import suggest
 from antdrive.base.errors import InputError
 from antdrive.base.records import meanings_of
+from antdrive.base.tables import table
 from antdrive.cli import options
-from antdrive.cli.console import show, table
+from antdrive.cli.console import show
 from antdrive.cli.listings import Row, planner_lines
 from antdrive.cli.options import argument
 from antdrive.cli.output import plain

@@ -48,14 +48,14 @@ def report(
     if campaigns:
         raise InputError(f"{other}: is not a campaign folder, but {campaigns[0]} is; write separate reports")
     refuse_campaign_options([*(["planner"] if planner else []), *(["columns"] if named else []), *query.given], other)
-    from antdrive.views.pages.run_report import write_report, write_run_figures
+    from antdrive.views.pages.report import write_report, write_run_figures
 
     facts: dict[str, object] = {}
     lines: list[str] = []
     if out is not None:
         count = write_report(folders, out, title=title, embed_films=embed_films)
         facts = {"file": str(out), "runs": count, "bytes": out.stat().st_size}
-        lines = [f"{count} runs, {format_size(out.stat().st_size)}", *file_lines({"report": out})]
+        lines = [f"{count} run{'s' * (count != 1)}, {format_size(out.stat().st_size)}", *file_lines({"report": out})]
     if figures is not None:
         facts["figures"] = [str(path) for path in write_run_figures(folders, figures)]
         lines += file_lines({"figures": figures})

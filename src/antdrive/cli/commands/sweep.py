@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 from antdrive.base.errors import InputError
+from antdrive.base.tables import table
 from antdrive.cli import options
 from antdrive.cli.campaign_options import campaign_from
-from antdrive.cli.console import campaign_bar, print_error, show, table
+from antdrive.cli.console import campaign_bar, print_error, show
 from antdrive.cli.exits import SUCCEEDED
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults
@@ -109,7 +110,7 @@ def sweep(
         results = make_runs(requested, out, expansion=expansion, progress=progress, notify=print_error, **rest)
     files: list[str] = []
     if report is not None:
-        from antdrive.views.pages.campaign_report import report_campaign
+        from antdrive.views.pages.report import report_campaign
 
         files = [str(path) for path in report_campaign(out, report)]
     facts = {
@@ -129,7 +130,7 @@ def sweep(
 def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
     """Raise an error about options without effect."""
     if report is not None:
-        from antdrive.views.pages.campaign_report import check_suffix
+        from antdrive.views.pages.report import check_suffix
 
         check_suffix(report)
         if dry_run:

@@ -5,8 +5,6 @@ from .evaluation import Evaluation as Evaluation
 from .evaluation import evaluate as evaluate
 from .scenarios import scenario_of as scenario_of
 from .scenarios import select as select
-from .strategies import tasks as tasks
-from .strategies import worlds as worlds
 from .suite import SuiteCase as SuiteCase
 from .suite import load_suite as load_suite
 from .suite import suite_schema as suite_schema

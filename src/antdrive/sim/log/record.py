@@ -406,6 +406,11 @@ class DriveRecord:
         return any(setting in {field.name for field in dataclasses.fields(kind)} for kind in (cls, SensingRecord))
 
     @property
+    def rows_per_period(self) -> int:
+        """Number of rows in a control period."""
+        return max(1, self.physics_hz // self.control_hz)
+
+    @property
     def exploring(self) -> bool:
         """Whether the robot had no map."""
         return self.sensing is not None and self.sensing.map == "none"

@@ -263,6 +263,11 @@ class Rollout:
         return self.record.outcome
 
     @property
+    def first_contact(self) -> int:
+        """Row of the first contact; the number of rows without one."""
+        return int(self.contacts[0, 0]) if len(self.contacts) else len(self.t)
+
+    @property
     def digest(self) -> str:
         """SHA-256 of everything that a repetition must reproduce: the arrays, and the record without wall-clock times.
 
