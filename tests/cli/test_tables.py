@@ -1,9 +1,7 @@
 """Tables and signs on terminals of any width."""
 
-import re
 import sys
 from collections import Counter
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -117,16 +115,3 @@ def test_streams_that_cannot_encode_the_signs_get_plain_ones(monkeypatch, capsys
     monkeypatch.setattr(console, "_encodes", lambda text: False)
     print_line(f"{GOOD} one, {BAD} other")
     assert capsys.readouterr().out == "+ one, x other\n"
-
-
-def test_every_command_with_a_table_is_here():
-    cli = Path(console.__file__).parent
-    users = {
-        path.stem
-        for path in cli.rglob("*.py")
-        if path.name != "console.py" and re.search(r"\btable\(", path.read_text())
-    }
-    here = {name.partition(":")[0].replace("-", "_") for name in TABLES}
-    assert here <= users
-    lists = {words[0] for words in LISTS}  # `listings` has their tables
-    assert users - {"campaign_tables", "listings"} <= here | lists

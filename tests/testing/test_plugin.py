@@ -170,7 +170,7 @@ def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted):
         (
             "spl",
             "null",
-            "a.drive.yaml::clear[[]0]: not compared: spl; missing or null in the baseline: renew it",
+            "a.drive.yaml::clear[[]0]: not compared: spl; the baseline has no value; antdrive accept adds it",
         ),
     ],
     ids=["better", "hidden"],

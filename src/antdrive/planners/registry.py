@@ -86,10 +86,7 @@ def recorded_planner(name: str, /, **options: Any) -> Planner:
 
 
 def planner_version(name: str) -> str:
-    """Return a planner's distribution and version, with the hash of its file for third-party planners.
-
-    Args:
-        name: a name for `load_planner`
+    """Return the distribution and version of the planner with a name, with the hash of its file for third-party planners.
 
     Raises:
         InputError: the planner is unknown.

@@ -43,20 +43,14 @@ def is_user_code(name: str) -> bool:
 
 
 def record_name(name: str) -> str:
-    """Return a planner's name in records and tables: the registered name, or the class name in user code.
-
-    Args:
-        name: a name for `load_planner`
-    """
+    """Return a planner's name in records and tables: the registered name, or the class name in user code."""
     return name.rpartition(":")[2]
 
 
 def label_names(names: Sequence[str], taken: Collection[str] = ()) -> list[str]:
     """Return labels for tables and folders: `Greedy` for `mine.py:Greedy`, or `mine-Greedy` if another planner is a Greedy.
 
-    Args:
-        names: different names for `load_planner`
-        taken: further labels in use
+    The names differ; labels in `taken` are in use.
     """
     short = [record_name(name) for name in names]
     used = Counter([*short, *taken])

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Logged:
+class LoggedRun:
     """Run known by its log alone."""
 
     rollout: Rollout
     certificate: Certificate
 
     @classmethod
-    def of(cls, rollout: Rollout) -> Logged:
+    def of(cls, rollout: Rollout) -> LoggedRun:
         """Return a log with its certificate."""
         return cls(rollout, certify(rollout))
 
@@ -57,7 +57,7 @@ class Fact:
     name: str  # key in result.json, or column of a campaign's table
     # what shows it: the scenario as written, the log, its certificate, or a clock, which the log repeats
     proof: Literal["written", "log", "certificate", "clock"]
-    of: Callable[[Logged], Any]  # its value by a log with its certificate
+    of: Callable[[LoggedRun], Any]  # its value by a log with its certificate
     undriven: Callable[[Run], Any] = lambda run: None  # its value without a log
     unit: str = ""  # "1" for a ratio or a count; empty for words
     column: str = ""  # type of its column in a campaign's table; empty: none
@@ -65,12 +65,12 @@ class Fact:
     optional: bool = False  # whether None is omitted
 
 
-def _frame(log: Logged) -> list[float] | None:
+def _frame(log: LoggedRun) -> list[float] | None:
     frame = log.record.task.frame
     return list(frame) if any(frame) else None
 
 
-def _ends(log: Logged) -> dict[str, Any]:
+def _ends(log: LoggedRun) -> dict[str, Any]:
     task = log.record.task
     ends: dict[str, Any] = plain_value(
         {"start": task.start, "goal": task.goal, "goal_tolerance_m": task.goal_tolerance}
@@ -78,7 +78,7 @@ def _ends(log: Logged) -> dict[str, Any]:
     return ends
 
 
-def _changes(log: Logged) -> dict[str, Any]:
+def _changes(log: LoggedRun) -> dict[str, Any]:
     """Return the keys of `settings` that the log repeats, without the rules among movers that were asked for."""
     sensed = log.record.sensing or SensingRecord(map="given", localisation="fixes", odometry=1.0)
     return {
@@ -88,13 +88,13 @@ def _changes(log: Logged) -> dict[str, Any]:
     }
 
 
-def _sights(log: Logged) -> list[dict[str, Any]] | None:
+def _sights(log: LoggedRun) -> list[dict[str, Any]] | None:
     return [sight.as_dict() for sight in passed(log.rollout)] if len(log.rollout.scans) else None
 
 
 def _metrics() -> Iterator[Fact]:
     for name, metric in METRICS.items():
-        of: Callable[[Logged], float] = functools.partial(lambda name, log: log.metrics[name], name)
+        of: Callable[[LoggedRun], float] = functools.partial(lambda name, log: log.metrics[name], name)
         more: dict[str, Any] = {"undriven": lambda run: run.plan.wall_s} if name == "plan_s" else {}
         yield Fact(name, metric.proof, of, unit=metric.unit, column="double", within="metrics", optional=True, **more)
 
@@ -146,9 +146,9 @@ IN_RESULT = tuple(name for name, fact in FACTS.items() if fact.within is not Non
 IN_TABLE = tuple(name for name, fact in FACTS.items() if fact.column)
 
 
-def facts_of(run: Run | Logged, names: Sequence[str] = IN_RESULT) -> dict[str, Any]:
+def facts_of(run: Run | LoggedRun, names: Sequence[str] = IN_RESULT) -> dict[str, Any]:
     """Return facts of a finished run by name, as plain values; of a log alone, its settings are those that it repeats."""
-    if isinstance(run, Logged):
+    if isinstance(run, LoggedRun):
         return _known({name: FACTS[name].of(run) for name in names})
     facts = {name: value for name, value in _written(run).items() if name in names}
     log = run.logged
@@ -168,7 +168,7 @@ def _written(run: Run) -> dict[str, Any]:
     return {**written, "options": dict(options) or written["options"], "cell_m": run.grid.cell}
 
 
-def result_of(run: Run | Logged, names: Sequence[str] = IN_RESULT) -> dict[str, Any]:
+def result_of(run: Run | LoggedRun, names: Sequence[str] = IN_RESULT) -> dict[str, Any]:
     """Return facts, nested as in result.json."""
     result: dict[str, Any] = {}
     for name, value in facts_of(run, names).items():

@@ -14,7 +14,7 @@ from antdrive.planners import PlanResult, PlanStatus
 from antdrive.sim.compose import compose, warm_up_replanning
 from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
 from antdrive.sim.driving.plants import Bullet
-from antdrive.sim.facts import Logged, result_of
+from antdrive.sim.facts import LoggedRun, result_of
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
@@ -69,9 +69,9 @@ class Run:
         return self.outcome is Outcome.SUCCEEDED and self.certificate is not None and self.certificate.certified
 
     @functools.cached_property
-    def logged(self) -> Logged | None:
+    def logged(self) -> LoggedRun | None:
         """The log with its certificate; None without a log."""
-        return None if self.rollout is None else Logged(self.rollout, self.certificate or certify(self.rollout))
+        return None if self.rollout is None else LoggedRun(self.rollout, self.certificate or certify(self.rollout))
 
     @property
     def metrics(self) -> dict[str, float]:
@@ -93,7 +93,7 @@ class Run:
             raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
         return METRICS[name](log.rollout)
 
-    def _driven(self) -> Logged:
+    def _driven(self) -> LoggedRun:
         if self.logged is None:
             reason = f": {self.reason}" if self.reason else ""
             raise ValueError(f"no rollout: planning ended with {self.outcome.key}{reason}")

@@ -11,7 +11,7 @@ from typing import Any
 from antdrive.base.errors import input_error
 from antdrive.base.files import as_json, parse_json, read_bytes
 from antdrive.robots.spec import RobotSpec
-from antdrive.sim.facts import IN_RESULT, Logged, result_of
+from antdrive.sim.facts import IN_RESULT, LoggedRun, result_of
 from antdrive.sim.log.consistency import wrong_optima
 from antdrive.sim.log.record import differences, hashes_of
 from antdrive.sim.log.rollout import Rollout
@@ -32,7 +32,7 @@ def read_result(path: Path) -> Mapping[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def false_claims(result: Mapping[str, Any], log: Logged) -> Iterator[str]:
+def false_claims(result: Mapping[str, Any], log: LoggedRun) -> Iterator[str]:
     """Yield a sentence for every value in a `result.json` that the log contradicts. Missing keys are no contradiction."""
     if result.get("digest") != log.rollout.digest:
         yield "result.json: belongs to another log: its digest differs"
@@ -88,7 +88,7 @@ def verify_log(
         elsewhere: returns `rerun_fingerprint(log, planner)` of a new process, for the replay; None if that is unknown
     """
     rollout = Rollout.load(log)
-    logged = Logged.of(rollout)
+    logged = LoggedRun.of(rollout)
     certificate = logged.certificate
     results = certificate.as_dict()
     problems = [*certificate.problems, *differences(rollout.record, task=task, robot=robot)]

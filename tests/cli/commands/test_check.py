@@ -54,7 +54,7 @@ def test_a_suite_is_accepted_and_then_passes(antdrive, suite):
     older = suite.parent / "baselines" / "a" / "clear-0.json"
     older.write_text(re.sub(r' *"spl": [\d.]+,\n', "", older.read_text()))
     code, out, _ = antdrive("check", ".", "--jobs", "1", "--only", "clear")
-    assert (code, out.splitlines()[1]) == (0, "  not compared: spl; missing or null in the baseline: renew it")
+    assert (code, out.splitlines()[1]) == (0, "  not compared: spl; the baseline has no value; antdrive accept adds it")
 
 
 def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive, suite):

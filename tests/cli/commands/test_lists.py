@@ -31,6 +31,27 @@ def test_every_planner_is_listed_with_its_options(antdrive):
     assert antdrive("planners", "acohan")[0] == 2
 
 
+def test_a_planner_of_ones_own_is_described_as_built_in_ones_are(antdrive, tmp_path):
+    own = [
+        "class Mine(AStar):",
+        '    """My own search.',
+        "",
+        "    Attributes:",
+        "        eagerness: its zeal",
+        '    """',
+    ]
+    lines = [
+        "from dataclasses import dataclass",
+        "from antdrive.planners import AStar",
+        "@dataclass(frozen=True, kw_only=True)",
+    ]
+    (tmp_path / "mine.py").write_text("\n".join([*lines, *own, "    eagerness: float = 2.0"]))
+    code, out, err = antdrive("planners", "mine.py:Mine")
+    assert (code, err) == (0, "")
+    assert out.startswith("mine.py:Mine: My own search.\n")
+    assert re.search("^eagerness +2.0 +its zeal$", out, re.MULTILINE)
+
+
 @pytest.mark.parametrize("words", LISTS, ids=" ".join)
 def test_a_list_prints_what_its_command_prints(antdrive, capsys, words):
     code = exit_code_of(list(words))

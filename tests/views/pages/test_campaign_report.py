@@ -13,7 +13,7 @@ from antdrive.views.colour_vision import luminance
 from antdrive.views.colours import label_styles
 from antdrive.views.pages.campaign_summary import summarise
 from antdrive.views.pages.charts import campaign_charts, write_charts
-from antdrive.views.pages.report import Report, report_data, write_campaign_report
+from antdrive.views.pages.report import Report, report_data
 from tests.runs.made_up_campaign import Skill, made_up_columns
 from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
 
@@ -80,7 +80,7 @@ def summary(columns):
 @pytest.fixture(scope="module")
 def page(summary, tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
-    return write_campaign_report(summary, folder / "a campaign", folder / "page.html")[0]
+    return Report.of(summary, folder / "a campaign").write(folder / "page.html")[0]
 
 
 @pytest.fixture(scope="module")
@@ -229,7 +229,7 @@ def test_long_names_of_planners_stay_whole_and_apart(tmp_path):
     assert [title.get_text().replace("\n", " ") for title in titles] == names
     boxes = [title.get_window_extent() for title in titles]
     assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
-    page = write_campaign_report(summary, tmp_path, tmp_path / "page.html")[0].read_text()
+    page = Report.of(summary, tmp_path).write(tmp_path / "page.html")[0].read_text()
     styles = "".join(re.findall(r"<style>(.*?)</style>", page, flags=re.DOTALL))
     assert re.findall(r"([^{}]*){[^{}]*text-overflow", styles) == [" #runs td, #runs th "]
 
@@ -278,7 +278,7 @@ def test_an_own_planner_has_the_same_colour_in_campaigns_as_in_films():
 def test_8500_runs_make_a_page_below_10_megabytes(tmp_path):
     planners = {f"planner-{k}": Skill(0.98 - 0.01 * k, 1.0 + 0.02 * k) for k in range(17)}
     summary = summarise(RunTable(made_up_columns(planners, worlds=50, seeds=10)), title="big")
-    page = write_campaign_report(summary, tmp_path, tmp_path / "page.html")[0]
+    page = Report.of(summary, tmp_path).write(tmp_path / "page.html")[0]
     assert len(summary.table) == 8500
     assert page.stat().st_size < 10_000_000
     assert np.isfinite([row.interval.low for row in summary.success]).all()

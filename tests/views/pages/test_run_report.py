@@ -120,7 +120,7 @@ def test_on_a_phone_the_page_is_as_wide_as_the_screen(runs, tmp_path):
 
 
 def test_the_page_needs_no_network_and_escapes_its_content(runs, tmp_path):
-    assert write_report(runs, tmp_path / "report.html", title="Ours & theirs") == 3
+    assert write_report(runs, tmp_path / "report.html", title="Ours & theirs").runs == 3
     text = (tmp_path / "report.html").read_text()
     assert "Ours &amp; theirs" in text
     assert "<b>odd</b>" not in text, "what files say is shown, not run"
@@ -350,15 +350,15 @@ def test_markdown_puts_failures_first_and_links_films(small_run, collided_run, t
 def test_runs_made_in_python_become_a_report_together_with_folders(small_run, collided_run, tmp_path):
     write_run(small_run, tmp_path / "runs" / "a")
     page = tmp_path / "page.html"
-    assert antdrive.write_report([small_run, collided_run, tmp_path / "runs"], str(page), title="mine") == 3
+    assert antdrive.write_report([small_run, collided_run, tmp_path / "runs"], str(page), title="mine").runs == 3
     text = page.read_text()
     assert "2 / 3" in text
     assert text.count("data:image/webp") == 2
     assert len(set(re.findall(r'<section class="run" id="(run-\d)"', text))) == 3
-    assert antdrive.write_report(small_run, page, figures=False, films=True) == 1
+    assert antdrive.write_report(small_run, page, figures=False, films=True).runs == 1
     assert "data:image" not in page.read_text()
     assert page.read_text().count("data:video/mp4") == 1
-    assert antdrive.write_report(small_run, tmp_path / "page.md") == 1
+    assert antdrive.write_report(small_run, tmp_path / "page.md").runs == 1
     assert "1 / 1" in (tmp_path / "page.md").read_text()
 
 

@@ -75,20 +75,15 @@ def write_reproducers(
         originals = _write(found, [""] * len(found), Path(place))
         elsewhere = run_elsewhere(originals, suite)
     pairs = zip(elsewhere[: len(found)], elsewhere[len(found) :], strict=True)
-    return [
-        Reproducer(_name(k), finding, done, _repeats(finding, done, *pair))
-        for k, (finding, done, pair) in enumerate(zip(hunt.distinct, small, pairs, strict=True))
-    ]
+    made = []
+    for k, (finding, done, pair) in enumerate(zip(hunt.distinct, small, pairs, strict=True)):
+        same = pair == (finding.fingerprint, done.fingerprint) and done.failure() == finding.failure
+        made.append(Reproducer(_name(k), finding, done, same))
+    return made
 
 
 def _name(index: int) -> str:
     return f"failure-{index + 1}"
-
-
-def _repeats(finding: Finding, small: Attempt, original_elsewhere: str, small_elsewhere: str) -> bool:
-    """Return whether a failure and its minimal scenario repeat bitwise in another process and fail in the same way."""
-    same = (original_elsewhere, small_elsewhere) == (finding.fingerprint, small.fingerprint)
-    return same and small.failure() == finding.failure
 
 
 def write_reproducer(shrunk: Shrunk, name: str, folder: Path, *, bound: Bound | None) -> tuple[Attempt, Path, bool]:

@@ -282,6 +282,7 @@ class MoveCount:
         return self.straight + 2 * self.diagonal == rows + cols and self.diagonal <= min(rows, cols)
 
 
+@functools.cache
 def candidate(
     shape: tuple[int, int],
     start: tuple[int, int],
@@ -297,7 +298,7 @@ def candidate(
     margin: int = 1,
     obstacles: int | None = None,
 ) -> Query:
-    """Return a random map whose shortest path has the given straight and diagonal moves.
+    """Return a random map whose shortest path has the given straight and diagonal moves, made once per process.
 
     It begins with random obstacles. Further ones are put onto the shortest path until it has, but never exceeds, the
     wanted length. Obstacles keep `margin` free cells from start and goal. With `obstacles`, the map has exactly this

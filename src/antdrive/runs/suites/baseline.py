@@ -30,6 +30,7 @@ from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import canonical_hash, hashes_of_configuration
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.timeline import Timeline
 from antdrive.sim.pipeline import ENDED_BY, Run
 from antdrive.sim.recording import configuration_of
 from antdrive.sim.scenario import Scenario
@@ -277,12 +278,10 @@ def _line(rollout: Rollout, hz: float) -> tuple[tuple[float, float, float, int],
     """Sample the driven line at a rate, with the drive's end as the last sample."""
     end = float(rollout.t[-1])
     moments = np.append(np.arange(0.0, max(end - 0.5 / hz, 0.0), 1 / hz), end) if end > 0 else np.zeros(1)
-    rows = np.clip(np.round(moments * rollout.record.physics_hz).astype(int), 0, len(rollout.t) - 1)
-    # Interpolate, because the physics rate need not be a multiple of the line's.
-    turned = np.column_stack([rollout.pose[:, :2], np.unwrap(rollout.pose[:, 2])])
-    x, y, yaw = (np.interp(moments, rollout.t, turned[:, axis]) for axis in range(3))
+    timeline = Timeline(rollout)  # it interpolates, because the physics rate need not be a multiple of the line's
+    x, y, yaw = timeline.poses(moments).T
     samples = np.column_stack([x, y, wrap_angle(yaw)]).tolist()
     return tuple(
         (round(x, 3) + 0.0, round(y, 3) + 0.0, round(a, 3) + 0.0, int(rule))
-        for (x, y, a), rule in zip(samples, rollout.limiter[rows].tolist(), strict=True)
+        for (x, y, a), rule in zip(samples, rollout.limiter[timeline.nearest(moments)].tolist(), strict=True)
     )

@@ -125,8 +125,8 @@ def spl(rollout: Rollout) -> float:
 
 
 def barn(rollout: Rollout) -> float:
-    """Exact score of the BARN challenge: T / min(max(`arrival_s`, 2 T), 8 T), at most 0.5, where T = `plan.euclidean_optimum_m` /
-    (2 m/s). The challenge's own score, which `antdrive barn` shows beside it, has OT for T, from the length of its reference path.
+    """Exact score of the BARN challenge: T / min(max(`arrival_s`, 2 T), 8 T), at most 0.5; T = `plan.euclidean_optimum_m` /
+    (2 m/s). The challenge's own score, which `antdrive barn` shows beside it, has OT for T, by the length of its reference path.
     0 without success, if `arrival_s` is infinite, and if the optimum is null or 0.
     """
     optimum, arrival = rollout.record.plan.euclidean_optimum_m, arrival_s(rollout)

@@ -12,7 +12,7 @@ import json
 import math
 import re
 import typing
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
@@ -473,16 +473,13 @@ class DriveRecord:
 
 def _require_shallow(value: Any) -> None:
     """Refuse values nested deeper than those of any file, which would exhaust the stack of readers."""
-    layer = [value]
+    layer: list[Any] = [[value]]
     for _ in range(MAX_DEPTH):
-        layer = [v for outer in layer for v in _inner(outer) if isinstance(v, dict | list)]
+        values = (value for outer in layer for value in (outer.values() if isinstance(outer, dict) else outer))
+        layer = [value for value in values if isinstance(value, dict | list)]
         if not layer:
             return
     raise ValueError(f"nested deeper than {MAX_DEPTH} levels")
-
-
-def _inner(value: Any) -> Iterable[Any]:
-    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
 
 
 def _missing_key(written: Any, found: Any) -> str:
@@ -511,8 +508,9 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, Written):
         return settings_of(value.plain())
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = [field for field in dataclasses.fields(value) if not _says_nothing(field, getattr(value, field.name))]
-        return {field.name: plain_value(getattr(value, field.name)) for field in fields}
+        fields = [(field, getattr(value, field.name)) for field in dataclasses.fields(value)]
+        said = ((field, v) for field, v in fields if not (field.metadata.get("omit_if_default") and v == field.default))
+        return {field.name: plain_value(v) for field, v in said}
     if isinstance(value, Mapping):
         return {str(key): plain_value(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
@@ -520,10 +518,6 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     return value if isinstance(value, bool | int | float | str | None) else str(value)
-
-
-def _says_nothing(field: dataclasses.Field[Any], value: Any) -> bool:
-    return bool(field.metadata.get("omit_if_default")) and value == field.default
 
 
 def settings_of(values: Any) -> dict[str, Any]:

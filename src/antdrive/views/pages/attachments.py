@@ -88,23 +88,21 @@ def _lies_in(path: Path, folder: Path) -> bool:
     return path.is_file() and path.resolve().is_relative_to(folder.resolve())
 
 
-def attach_figures(runs: list[ReportedRun], base: Path, used: int) -> None:
-    """Embed figures, kind by kind, up to `EMBEDDED_BYTES` of which `used` are taken; link the others."""
+def attach_figures(runs: list[ReportedRun], base: Path) -> None:
+    """Embed figures of the runs' folders, kind by kind, up to `EMBEDDED_BYTES`; link the others."""
+    used = sum(len(figure.source) for run in runs for figure in run.figures)
     for name, caption in FIGURE_CAPTIONS.items():
         for run in runs:
-            assert run.folder is not None
-            path = run.folder / name
-            if not _lies_in(path, run.folder):
+            path = None if run.folder is None else run.folder / name
+            if path is None or not _lies_in(path, path.parent):
                 continue
-            if age := _older(path, run.folder):
-                run.links.append(Attachment(name + age, link_to(path, base)))
-                continue
-            figure = embedded(path, caption)
-            if used + len(figure.source) <= EMBEDDED_BYTES:
+            age = _older(path, path.parent)
+            figure = None if age else embedded(path, caption)
+            if figure is not None and used + len(figure.source) <= EMBEDDED_BYTES:
                 used += len(figure.source)
                 run.figures.append(figure)
             else:
-                run.links.append(Attachment(name, link_to(path, base)))
+                run.links.append(Attachment(name + age, link_to(path, base)))
 
 
 def embedded(path: Path, caption: str) -> Attachment:

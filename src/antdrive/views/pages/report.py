@@ -11,17 +11,18 @@ import itertools
 import os
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.files import file_name, known_suffix
 from antdrive.planners.user_code import record_name
 from antdrive.runs.campaigns.results import common_folder, read_runs
+from antdrive.runs.campaigns.store import MANIFEST
 from antdrive.runs.statistics.run_table import HASHES, RunTable
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
@@ -56,6 +57,8 @@ from antdrive.views.pages.tables import (
 if TYPE_CHECKING:
     from antdrive.views.colours import LabelStyle
 
+#: Suffixes of a campaign's report, and of one of runs.
+SUFFIXES, RUN_SUFFIXES = (".html", ".md", ".tex", ".csv"), (".html", ".md")
 MARKDOWN_BYTES = 60_000  # of a Markdown report; GitHub refuses comments of more than 65,536 characters
 MARKDOWN_ROWS = 60  # per table of a campaign
 MARKDOWN_FAILURES = 25  # listed failures of a campaign
@@ -91,6 +94,11 @@ class Report:
     summary: CampaignSummary | None = None  # comparison of a campaign's planners
     runs: Sequence[ReportedRun] = ()  # sections, one per row; empty for a campaign
 
+    @classmethod
+    def of(cls, summary: CampaignSummary, folder: Path) -> Report:
+        """Return the report of a campaign in a folder."""
+        return cls(summary.title, summary.table, folder, summary)
+
     @property
     def planners(self) -> tuple[str, ...]:
         """The planners' labels."""
@@ -116,6 +124,20 @@ class Report:
         """Columns that the table of runs shows."""
         names = ("world", "planner", *self.differing, "outcome", "test", "seed", *MEASURED)
         return [name for name in names if any(value is not None for value in self.table.columns.get(name, ()))]
+
+    def write(self, out: Path, columns: Sequence[str] = ()) -> list[Path]:
+        """Write the report in the format of the file's suffix, a campaign's tables with these columns; return the files.
+
+        Raises:
+            InputError: an unknown suffix or column.
+        """
+        kind = known_suffix(out, SUFFIXES if self.summary else RUN_SUFFIXES)
+        try:
+            if self.summary is not None and kind in (".tex", ".csv"):
+                return (write_latex if kind == ".tex" else write_csv)(self.summary, out, columns)
+            return [write_text(out, _page(self, out.parent) if kind == ".html" else _markdown(self, columns))]
+        except FieldError as error:
+            raise InputError(f"--{error}") from None
 
 
 def summarise_campaign(
@@ -145,7 +167,7 @@ def summarise_campaign(
     Raises:
         InputError: the folder holds no campaign, no finished run, or no such planner or metric.
     """
-    folders = _folders(folder)
+    folders = [Path(one) for one in ([folder] if isinstance(folder, str | Path) else folder)]
     try:
         table, size = read_runs(folders, where, planners)
         named = title or ", ".join(one.resolve().name for one in folders)
@@ -155,117 +177,92 @@ def summarise_campaign(
         raise input_error(" ".join(map(str, folders)), str(error)) from None
 
 
-def _folders(folder: str | Path | Sequence[str | Path]) -> list[Path]:
-    return [Path(one) for one in ([folder] if isinstance(folder, str | Path) else folder)]
+class ReportFiles(NamedTuple):
+    """Extent of a written report."""
 
-
-def report_campaign(
-    folder: str | Path | Sequence[str | Path],
-    out: str | Path | None,
-    *,
-    columns: Sequence[str] = (),
-    figures: str | Path | None = None,
-    **asked: Any,
-) -> list[Path]:
-    """Write a campaign's report, a page or its tables, or its charts.
-
-    Args:
-        folder: the campaign's folder, or several
-        out: the file to write: .html, .md, .tex or .csv; None: charts alone
-        columns: headings of the tables to write, in order; tables without all of them are left out; not for .html
-        figures: folder for the charts as PDF and SVG; None: none
-        asked: title, metrics, against, planners, allow and where, as in `summarise_campaign`
-
-    Returns:
-        The written files; for .csv the second holds the pairs.
-
-    Raises:
-        InputError: the folder holds no campaign, no finished run, or no such planner, metric or column; another suffix.
-    """
-    target = None if out is None else Path(out)
-    suffix = None if target is None else check_suffix(target)
-    if columns and suffix in (None, ".html"):
-        raise InputError("--columns: applies to .md, .tex and .csv")
-    summary = summarise_campaign(folder, **asked)
-    files = [] if target is None else write_campaign_report(summary, common_folder(_folders(folder)), target, columns)
-    if figures is not None:
-        from antdrive.views.pages.charts import campaign_charts, write_charts
-
-        report = _of_campaign(summary, Path())
-        files += write_charts(campaign_charts(summary, report.styles), report.planners, Path(figures))
-    return files
-
-
-def write_campaign_report(summary: CampaignSummary, folder: Path, out: Path, columns: Sequence[str] = ()) -> list[Path]:
-    """Write a campaign's report in the format of the file's suffix, if given with these columns of its tables."""
-    try:
-        return WRITERS[check_suffix(out)](_of_campaign(summary, folder), out, columns)
-    except FieldError as error:
-        raise InputError(f"--{error}") from None
-
-
-def _of_campaign(summary: CampaignSummary, folder: Path) -> Report:
-    return Report(summary.title, summary.table, folder, summary)
-
-
-def check_suffix(out: Path) -> str:
-    """Return the suffix of a report; raise `InputError` if it is unknown."""
-    return known_suffix(out, WRITERS)
+    runs: int  # number of runs
+    files: list[Path]  # the report, a campaign's pairs for .csv, and the charts
 
 
 def write_report(
-    runs: Run | str | os.PathLike[str] | Iterable[Run | str | os.PathLike[str]],
-    out: str | os.PathLike[str],
+    sources: Run | str | os.PathLike[str] | Iterable[Run | str | os.PathLike[str]],
+    out: str | os.PathLike[str] | None,
     *,
     title: str | None = None,
+    columns: Sequence[str] = (),
+    charts: str | os.PathLike[str] | None = None,
     embed_films: bool = False,
     figures: bool = True,
     films: bool = False,
-) -> int:
-    """Write a report of runs from Python and of all runs below folders.
+    **compared: Any,
+) -> ReportFiles:
+    """Write a report of runs from Python and of all runs below folders, or of campaigns.
 
-    >>> write_report([run(scenario), "out/slalom"], "report.html")
+    >>> write_report([run(scenario), "out/slalom"], "report.html").runs
+    2
 
     Args:
-        runs: one or more runs, or folders with runs of `antdrive run --out`
-        out: the file to write: a page (.html) or Markdown for a pull request (.md)
-        title: the report's title; default: the folder's name
+        sources: runs and folders with runs of `antdrive run --out`, one or more; or campaign folders
+        out: the file to write: a page (.html) or Markdown for a pull request (.md), of a campaign also .tex or .csv; None:
+            charts alone
+        title: the report's title; default: the folders' names
+        columns: headings of a campaign's tables to write, in order; tables without all of them are left out; not for .html
+        charts: folder for all charts as PDF and SVG; None: none
         embed_films: embed films of folders instead of linking them
         figures: embed each run's figures in the page
         films: film each run from Python and embed the film
-
-    Returns:
-        The number of runs.
+        compared: metrics, against, planners, allow and where, as in `summarise_campaign`
 
     Raises:
-        InputError: no runs, an invalid `result.json`, or an unknown suffix.
+        InputError: no runs, an invalid `result.json`, an unknown suffix, or no such planner, metric or column.
     """
-    target = Path(out)
-    page = (suffix := known_suffix(target, (".html", ".md"))) == ".html"
-    given: list[Any] = [runs] if isinstance(runs, Run | str | os.PathLike) else list(runs)
-    reported: list[ReportedRun] = []
+    given: list[Any] = [sources] if isinstance(sources, Run | str | os.PathLike) else list(sources)
+    folders = [Path(one) for one in given if not isinstance(one, Run)]
+    campaigns = (
+        bool(folders) and all((folder / MANIFEST).is_file() for folder in folders) and len(folders) == len(given)
+    )
+    target = None if out is None else Path(out)
+    if target is not None:
+        known_suffix(target, SUFFIXES if campaigns else RUN_SUFFIXES)
+    if columns and (target is None or target.suffix == ".html"):
+        raise InputError("--columns: applies to .md, .tex and .csv")
+    if not campaigns:
+        if target is not None:
+            report = _of_runs(given, target, title, embed_films=embed_films, figures=figures, films=films)
+        drawn = [] if charts is None else write_run_figures(folders, Path(charts))
+        return ReportFiles(len(report.table), report.write(target) + drawn) if target else ReportFiles(0, drawn)
+    summary = summarise_campaign(folders, title=title, **compared)
+    report = Report.of(summary, common_folder(folders))
+    files = [] if target is None else report.write(target, columns)
+    if charts is not None:
+        from antdrive.views.pages.charts import campaign_charts, write_charts
+
+        files += write_charts(campaign_charts(summary, report.styles), report.planners, Path(charts))
+    return ReportFiles(len(report.table), files)
+
+
+def _of_runs(
+    given: Sequence[Any], target: Path, title: str | None, *, embed_films: bool, figures: bool, films: bool
+) -> Report:
+    """Return the report of runs and of folders with runs, with their films and, for a page, their figures."""
+    page, reported = target.suffix == ".html", list[ReportedRun]()
     for source in given:
-        if isinstance(source, Run):
-            found = [reported_run(source)]
-            if page and figures:
-                found[0].figures.extend(attachments.drawn_figures(source))
-            if page and films:
-                found[0].films.extend(attachments.filmed(source))
-        else:
-            found = list(find_runs(Path(source)))
-            if not found:
-                raise InputError(f"{source}: no runs (no result.json); write them with `antdrive run --out`")
-            for run in found:
+        found = [reported_run(source)] if isinstance(source, Run) else list(find_runs(Path(source)))
+        if not found:
+            raise InputError(f"{source}: no runs (no result.json); write them with `antdrive run --out`")
+        for run in found:
+            if run.folder is not None:
                 attachments.attach_files(run, target.parent, embed_films and page)
-            if page and figures:
-                used = sum(len(figure.source) for run in reported for figure in run.figures)
-                attachments.attach_figures(found, target.parent, used)
+            elif page:
+                run.figures.extend(attachments.drawn_figures(source) if figures else ())
+                run.films.extend(attachments.filmed(source) if films else ())
         reported += found
     if not reported:
         raise InputError(f"{target}: no runs to report")
+    if page and figures:
+        attachments.attach_figures(reported, target.parent)
     name = title or (Path(given[0]).resolve().name if len(given) == 1 and not isinstance(given[0], Run) else "runs")
-    WRITERS[suffix](Report(shown(name), run_table(reported), target.parent, runs=reported), target, ())
-    return len(reported)
+    return Report(shown(name), run_table(reported), target.parent, runs=reported)
 
 
 def write_run_figures(folders: Iterable[Path], out: Path) -> list[Path]:
@@ -292,8 +289,8 @@ def write_run_figures(folders: Iterable[Path], out: Path) -> list[Path]:
     return files
 
 
-def _write_markdown(report: Report, out: Path, columns: Sequence[str]) -> list[Path]:
-    """Write the Markdown; sections and rows of runs beyond the size limit are only counted."""
+def _markdown(report: Report, columns: Sequence[str]) -> str:
+    """Return the Markdown; sections and rows of runs beyond the size limit are only counted."""
     ordered = sorted(range(len(report.table)), key=lambda k: bool(report.table.success[k]))
     rows, details = (min(len(report.runs), most) for most in (MOST_ROWS, MOST_DETAILS))
     failures = [] if report.runs else [k for k in ordered if not report.table.success[k]]
@@ -317,7 +314,7 @@ def _write_markdown(report: Report, out: Path, columns: Sequence[str]) -> list[P
             undetailed=len(report.runs) - details,
         )
         if len(text.encode()) <= MARKDOWN_BYTES or not rows:
-            return [write_text(out, text)]
+            return text
         rows, details = (rows, details // 2) if details > ENOUGH_DETAILS else (rows // 2, details // 2)
 
 
@@ -348,7 +345,8 @@ def outcome_counts(outcomes: Sequence[str]) -> str:
     return "; ".join([*(f"{count:,} {outcome}" for outcome, count in most), *([f"{rest:,} others"] * bool(rest))])
 
 
-def _write_page(report: Report, out: Path, columns: Sequence[str]) -> list[Path]:
+def _page(report: Report, folder: Path) -> str:
+    """Return the page for a folder."""
     planners, styles, summary = report.planners, report.styles, report.summary
     content: dict[str, Any] = {}
     if summary is not None:
@@ -363,7 +361,7 @@ def _write_page(report: Report, out: Path, columns: Sequence[str]) -> list[Path]
             "allowances": allowance_cells(summary) if summary.allowances else None,
             "charts": campaign_charts(summary, styles),
         }
-    text = rendered(
+    return rendered(
         "page.html.j2",
         **_common(report),
         **content,
@@ -374,9 +372,8 @@ def _write_page(report: Report, out: Path, columns: Sequence[str]) -> list[Path]
         words=WORDS,
         rows=len(report.table),
         runs=report.runs,
-        data=report_data(report, link_to(report.base, out.parent) + "/"),
+        data=report_data(report, link_to(report.base, folder) + "/"),
     )
-    return [write_text(out, text)]
 
 
 def report_data(report: Report, base: str) -> str:
@@ -446,18 +443,3 @@ def _common(report: Report) -> dict[str, Any]:
         ],
         "heading": [(name, measure_title(name)) for name in report.differing if not name.startswith("option.")],
     }
-
-
-WRITERS: Mapping[str, Callable[[Report, Path, Sequence[str]], list[Path]]] = MappingProxyType(
-    {
-        ".html": _write_page,
-        ".md": _write_markdown,
-        ".tex": lambda report, out, columns: write_latex(_compared(report), out, columns),
-        ".csv": lambda report, out, columns: write_csv(_compared(report), out, columns),
-    }
-)
-
-
-def _compared(report: Report) -> CampaignSummary:
-    assert report.summary is not None  # runs have no such tables: `write_report` refuses these suffixes
-    return report.summary

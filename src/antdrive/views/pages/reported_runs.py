@@ -13,7 +13,7 @@ from typing import Any
 
 from antdrive.base.errors import InputError, input_error
 from antdrive.runs.statistics.run_table import RunTable
-from antdrive.sim.facts import FACTS, Logged, facts_of
+from antdrive.sim.facts import FACTS, LoggedRun, facts_of
 from antdrive.sim.log.margin import has_default
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
@@ -97,7 +97,7 @@ def reported_run(run: Run) -> ReportedRun:
 def logged_run(rollout: Rollout, result: Mapping[str, Any], name: str, folder: Path | None = None) -> ReportedRun:
     """Return a run as its log says, and the contradictions of the result beside it."""
     try:
-        log = Logged.of(rollout)
+        log = LoggedRun.of(rollout)
         facts, sights = {**facts_of(log, WRITTEN), "metrics": log.metrics}, tuple(passed(rollout))
     except ValueError as error:
         raise input_error(name, str(error)) from None

@@ -17,7 +17,7 @@ from pydantic import BaseModel, Field
 
 from antdrive.base.atomic import write_text
 from antdrive.base.caches import cached
-from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_of, suggest, yaml_number
+from antdrive.base.checks import OneLine, SchemaVersion, check, file_schema, resolve, suggest, yaml_number
 from antdrive.base.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
 from antdrive.base.errors import FieldError, InputError, input_error, visible
 from antdrive.base.files import format_size
@@ -134,10 +134,7 @@ def load_task(world: str | os.PathLike[str], name: str | None = None, home: Path
 
 
 def load_tasks(world: str | os.PathLike[str]) -> Mapping[str, Task]:
-    """Load the tasks under a world's key `tasks`, by name.
-
-    Args:
-        world: as for `load_task`
+    """Load the tasks under a world's key `tasks`, by name; the world is that of `load_task`.
 
     Raises:
         InputError: the world does not exist, or its file is invalid.
@@ -251,11 +248,7 @@ def task_to_dict(task: Task) -> dict[str, Any]:
 
 
 def task_from_dict(data: Mapping[str, Any], source: str = "task") -> Task:
-    """Return the task in plain data: the inverse of `task_to_dict`.
-
-    Args:
-        data: mappings, lists, numbers and texts with the keys of a world file
-        source: name of the data in error messages
+    """Return the task in plain `data`: the inverse of `task_to_dict`. `source` names the data in errors.
 
     Raises:
         InputError: the data are invalid.
@@ -265,10 +258,7 @@ def task_from_dict(data: Mapping[str, Any], source: str = "task") -> Task:
 
 def task_schema() -> dict[str, Any]:
     """Return the JSON Schema of world files, for editors."""
-    schema = schema_of(WorldFile)
-    required = [key for key in schema["required"] if key != "name"]
-    draft = "https://json-schema.org/draft/2020-12/schema"
-    return {"$schema": draft, **schema, "required": required, "title": "antdrive world"}
+    return file_schema(WorldFile, "antdrive world")
 
 
 def _to_task(document: Document, entry: WorldFile | None = None) -> Task:
