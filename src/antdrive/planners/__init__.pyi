@@ -64,4 +64,3 @@ from .validation import check_step as check_step
 from .validation import checked as checked
 from .validation import request_plan as request_plan
 from .validation import require_result as require_result
-from .warmup import untimed as untimed
