@@ -30,7 +30,7 @@ $(VENV)/.core: pyproject.toml tools/find-python
 
 $(VENV)/.warm: $(VENV)/.core $(wildcard src/antdrive/*/_kernels*.py src/antdrive/*/*/_kernels*.py)
 	@echo "Compiling the kernels, once"
-	@$(BIN)/python -m antdrive.cli.compiling
+	@$(BIN)/python -m antdrive warm
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.core

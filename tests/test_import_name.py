@@ -21,7 +21,7 @@ from tools import loop
 from tools.dist import built, version_of
 
 ROOT = Path(__file__).parent.parent
-ROOMS = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli")
+ROOMS = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "testing", "cli")
 TESTS = """import sim
 
 def test_the_own_package_is_imported():

@@ -40,7 +40,7 @@ import pytest
 from markdown_it import MarkdownIt
 from sybil import Document, Example, Region, Sybil
 
-from antdrive.cli import console
+from antdrive.base import kernel_cache
 
 ROOT = Path(__file__).resolve().parents[1]
 #: A command of a block `console` with its output, and one of a block `sh`; lines go on after a backslash.
@@ -55,7 +55,7 @@ TESTED = {
     "examples/bridges/README.md": "tests/examples/test_bridges.py",
     "examples/regression_suite/README.md": "tests/examples/test_regression_suite.py",
 }
-COMPILING = f"antdrive: {console.COMPILING}"  # printed only by the first commands of an installation
+COMPILING = f"antdrive: {kernel_cache.COMPILING}"  # printed only by the first commands of an installation
 WIDTH = "100"  # terminal width for commands
 #: The project's settings of tests are not those of pages: all of them run, and may warn.
 OPTIONS = ("-p", "tools.pages", "-p", "no:cacheprovider", "-o", "addopts=", "-W", "ignore", "--tb=short", "-q")

@@ -30,7 +30,7 @@ from antdrive.views.film.film_options import FilmOptions
 from antdrive.views.film.prelude import planning_frames
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.video import STILLS, film, still
-from antdrive.views.pages.run_report import write_report
+from antdrive.views.pages.report import write_report
 from antdrive.worlds import list_worlds, load_task
 from antdrive.worlds.generators.generate import generated
 from antdrive.worlds.trajectories import Trajectories

@@ -420,7 +420,7 @@ def preload() -> None:
     import antdrive.runs.suites.scenarios
     import antdrive.sim.pipeline
     import antdrive.sim.verifying
-    import antdrive.views.pages.run_report
+    import antdrive.views.pages.report
     import antdrive.worlds  # noqa: F401
 
 

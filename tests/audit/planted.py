@@ -291,7 +291,7 @@ def in_fork(folder: Path, patch: Callable[[], None] | None) -> Tests:
 
 def logs_only() -> None:
     """Write the logs of failed drives and no pictures, which would take longer than the drives."""
-    from antdrive.cli.testing import evaluation
+    from antdrive.testing import evaluation
 
     def write(run: Any, folder: Path, *_: Any, **__: Any) -> dict[str, str]:
         if run.rollout is None:

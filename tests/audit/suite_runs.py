@@ -19,7 +19,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "regression_suite"
-PLUGINS = ("-p", "antdrive.cli.testing.plugin", "-p", "tests.audit.suite_runs", "-p", "no:cacheprovider")
+PLUGINS = ("-p", "antdrive.testing.plugin", "-p", "tests.audit.suite_runs", "-p", "no:cacheprovider")
 
 #: What came out of each test, by its name.
 Tests: TypeAlias = dict[str, dict[str, Any]]

@@ -230,6 +230,21 @@ class PlanResult:
         """The polyline to drive as fractional (row, col) (M, 2): `waypoints` if there are any, else `cells`."""
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return the plan as plain values, without history and field."""
+        return {
+            "status": self.status.name.lower(),
+            "sentence": self.status.value,
+            "reason": self.reason,
+            "cost_m": self.cost,
+            "length_m": self.line_length,
+            "work": self.work,
+            "work_unit": self.work_unit,
+            "plan_s": self.wall_s,
+            "options": {key: plain(value) for key, value in self.options.items()},
+            "cells": self.cells.tolist(),
+        }
+
     def __repr__(self) -> str:
         path = f" of {format_fixed(self.line_length, 3)} m" if len(self.cells) else ""
         reason = f" ({self.reason:.200})" if self.reason else ""
@@ -287,12 +302,7 @@ class TimedPlan(PlanResult):
         return np.stack([np.interp(when, knots, np.repeat(self.xy[:, k], 2)) for k in (0, 1)], axis=-1)
 
     def clearance(self, movers: Iterable[MoverMotion], step: float = 0.01) -> float:
-        """Return the minimum distance between the robot's centre and a mover's surface [m].
-
-        Args:
-            movers: the motions of the movers
-            step: sampling period [s]
-        """
+        """Return the minimum distance between the robot's centre and a surface of `movers` [m], sampled every `step` [s]."""
         ticks = max(1, math.ceil(self.duration / step))
         t = np.linspace(self.arrive[0], self.arrive[-1], ticks + 1)
         xy = self.at(t)
@@ -335,6 +345,11 @@ class Planner(Protocol):
     def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         """Find a path from the start cell to the goal cell."""
         ...
+
+
+def plain(value: Any) -> Any:
+    """Convert a planner's option to a JSON value."""
+    return value if isinstance(value, bool | int | float | str | None) else str(value)
 
 
 def capabilities_of(planner: Planner) -> Capabilities:
@@ -387,12 +402,7 @@ class GridPlanner(abc.ABC):
 
 
 def path_cost(cells: npt.ArrayLike, cell: float) -> float:
-    """Return the length [m] of a path of cells (N, 2): a step costs 1 or sqrt(2) cell sides.
-
-    Args:
-        cells: (row, col) of each cell of the path
-        cell: side of a cell [m]
-    """
+    """Return the length [m] of a path of cells (N, 2) with sides of `cell` [m]: a step costs 1 or sqrt(2) sides."""
     steps = np.abs(np.diff(np.asarray(cells), axis=0)).sum(axis=1)
     diagonal = int((steps == 2).sum())
     return cell * (len(steps) - diagonal + math.sqrt(2.0) * diagonal)
