@@ -30,7 +30,7 @@ import yaml
 
 from antdrive.base.atomic import atomic_write
 from antdrive.robots import list_robots
-from antdrive.runs.barn_challenge import campaign_data, lines, reference_times, unpacked
+from antdrive.runs.barn_challenge import by_world, campaign_data, reference_times, unpacked
 from antdrive.runs.campaigns import sweep
 from antdrive.runs.campaigns.results import SweepResults
 from antdrive.runs.pool import call_all
@@ -134,7 +134,7 @@ def filmed(results: SweepResults, films: bool) -> SweepResults:
 
 def row(name: str, runs: Any, fastest: Mapping[str, float], known: Any) -> list[str]:
     """Return a variant's results with those of the same drives with the map."""
-    line, columns = list(lines(runs, fastest))[-1], runs.to_pydict()
+    line, columns = list(by_world(runs, fastest))[-1], runs.to_pydict()
     seen = [area for area in columns["explored_m2"] if area is not None and area == area]
     time, length = "", ""
     if known is not None:

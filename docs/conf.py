@@ -45,7 +45,7 @@ html_math_renderer = "mathml"  # what browsers draw themselves; MathJax would be
 
 # The API. Docstrings write `code` in single backticks.
 default_role = "code"
-antdrive_index_only = ["antdrive", "antdrive.testing"]  # other pages describe what these offer
+antdrive_index_only = ["antdrive"]  # other pages describe what these offer
 add_module_names = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "antdrive"
-PACKAGES = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli")
+PACKAGES = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "testing", "cli")
 MODULES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 #: Parameters that their name and type explain.
 PLAIN = {
@@ -30,7 +30,7 @@ def test_a_class_name_has_one_meaning():
 
 def public():
     found = {}
-    rooms = ("testing", "runs.campaigns", "runs.suites", "sim.sensing")
+    rooms = ("runs.campaigns", "runs.suites", "sim.sensing")
     for package in ("antdrive", *(f"antdrive.{name}" for name in (*PACKAGES[:-1], *rooms))):
         module = importlib.import_module(package)
         found |= {f"{package}.{name}": getattr(module, name) for name in module.__all__}

@@ -11,8 +11,17 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "antdrive"
 PICTURE = ROOT / "docs" / "pictures" / "rooms.svg"
-ROWS = (("cli",), ("views",), ("runs",), ("sim",), ("planners", "robots"), ("worlds",), ("base",))  # from the top
-WIDTH, HEIGHT, BOX, STEP, LEFT = 760, 470, 44, 66, 20  # [px]
+ROWS = (
+    ("cli",),
+    ("testing",),
+    ("views",),
+    ("runs",),
+    ("sim",),
+    ("planners", "robots"),
+    ("worlds",),
+    ("base",),
+)  # from the top
+WIDTH, HEIGHT, BOX, STEP, LEFT = 760, 536, 44, 66, 20  # [px]
 
 
 def imports() -> dict[str, set[str]]:

@@ -202,9 +202,9 @@ import numpy as np
 from numba.core.registry import CPUDispatcher
 from antdrive.base import _kernels_compiler, kernel_cache
 from antdrive.base._kernels_interpreter import interpret
-from antdrive.cli import compiling
 from antdrive.planners import PLANNERS
 from antdrive.sim import Scenario, run
+from antdrive.views import warming
 
 calls, kinds = {}, set()
 
@@ -241,8 +241,9 @@ def twice(self, *args):
     return result
 
 _kernels_compiler._Uncompiled.__call__ = twice
-compiling._plan_with(list(PLANNERS))
-compiling._drive_and_film()
+for name in PLANNERS:
+    warming.plan_with(name)
+warming.drive_and_film()
 run(Scenario.of("forest", "astar"))
 run(Scenario.of("forest", "dstar-lite", map="none", time_limit=6.0))
 run(Scenario.of("plaza-moving", "dstar-lite", time_limit=6.0))

@@ -13,7 +13,7 @@ import pytest
 import antdrive
 from antdrive.base.atomic import LOCK, folder_lock
 from antdrive.base.errors import InputError
-from antdrive.cli.testing.session_summary import add_to_page
+from antdrive.testing.session_summary import add_to_page
 
 ROOT = Path(antdrive.__file__).parent
 OPENERS = {
@@ -33,7 +33,7 @@ ALLOWED = {
     "cli/commands/init.py": {"source.read_text"},
     "cli/commands/robots.py": {"known[name].read_text"},
     "cli/listings.py": {"LISTED.read_text"},
-    "cli/testing/session_summary.py": {"open"},
+    "testing/session_summary.py": {"open"},
     "runs/barn_challenge.py": {"tarfile.open"},
     "runs/campaigns/results.py": {"parquet_library().parquet.read_metadata"},
     "runs/campaigns/store.py": {
@@ -51,7 +51,7 @@ ALLOWED = {
         "Path(__file__).with_name('layout.json').read_text",
     },
     "views/export/topics.py": {"path.open"},
-    "views/pages/run_report.py": {"Image.open"},
+    "views/pages/attachments.py": {"Image.open"},
     "views/pages/tables.py": {"temporary.open"},
     "worlds/formats/map_server.py": {"part.write_bytes", "Image.open"},
     "worlds/formats/movingai.py": {"part.write_text"},

@@ -1,6 +1,5 @@
 """What every command shares: help, exit codes, streams, interruptions."""
 
-import importlib
 import json
 import os
 import re
@@ -13,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from antdrive.base.kernel_cache import COMPILING
 from antdrive.cli.commands import COMMANDS, ROBOTS, WORLDS
-from antdrive.cli.console import COMPILING
 from antdrive.cli.exits import BROKEN_PIPE
 from antdrive.cli.groups import application
 from antdrive.planners import PLANNERS, on_progress
@@ -27,8 +26,22 @@ def test_help_lists_every_command_with_the_first_line_of_its_own(antdrive, group
     listed = dict(re.findall(r"^  ([a-z-]+) {2,}(\S.*)$", out.split("Commands:")[1], flags=re.MULTILINE))
     for name, command in table.items():
         assert listed[name] == command.summary
-        function = getattr(importlib.import_module(f"antdrive.cli.commands.{command.module}"), command.function)
+        function = command.function(name)
         assert (function.__doc__ or "").split("\n")[0] == command.summary
+
+
+def every_command(command, words=()):
+    """The words of all commands, groups first."""
+    yield words
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from every_command(inner, (*words, name))
+
+
+def test_the_help_of_every_command_is_as_recorded(antdrive, monkeypatch, file_regression):
+    monkeypatch.setenv("COLUMNS", "80")
+    texts = [antdrive(*words, "--help") for words in every_command(application())]
+    assert {(code, err) for code, _, err in texts} == {(0, "")}
+    file_regression.check("\n".join(out for _, out, _ in texts), basename="help")
 
 
 @pytest.mark.parametrize("name", [*COMMANDS, *(f"worlds {name}" for name in WORLDS)])

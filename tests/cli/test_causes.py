@@ -12,10 +12,10 @@ import pytest
 
 from antdrive import list_robots
 from antdrive.base import kernel_cache
-from antdrive.cli.testing import evaluation
 from antdrive.planners import user_code
 from antdrive.sim.driving.rules import Pursuit
 from antdrive.sim.rerun import UNSTEADY
+from antdrive.testing import evaluation
 
 # pytester forgets what a run of pytest has imported; what the compiler loads at first must not be forgotten.
 numba.njit(lambda: 0.0)()
@@ -153,7 +153,7 @@ def reports(antdrive, pytester):
     (test,) = json.loads(out)["tests"]
     yield "\n".join((*test["faults"], *test["details"]))
     yield ET.parse(pytester.path / "j.xml").find(".//failure").text
-    plugin = ("-p", "antdrive.cli.testing.plugin", "-p", "no:cacheprovider", "--drive-film=never")
+    plugin = ("-p", "antdrive.testing.plugin", "-p", "no:cacheprovider", "--drive-film=never")
     yield pytester.runpytest_inprocess(*plugin, "--drive-plan-limit", "0.2").stdout.str()
 
 

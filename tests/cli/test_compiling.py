@@ -7,9 +7,10 @@ import sys
 import pytest
 
 from antdrive.base import kernel_cache
-from antdrive.cli.compiling import TOGETHER, _plan_with
-from antdrive.cli.console import COMPILING, bar, report_compiling
+from antdrive.base.kernel_cache import COMPILING
+from antdrive.cli.console import bar, report_compiling
 from antdrive.planners import PLANNERS
+from antdrive.views.warming import plan_with
 
 
 @pytest.fixture(autouse=True)
@@ -60,18 +61,11 @@ def test_warm_compiles_on_request_and_once(antdrive, compiled):
     assert compiled == ["all"]
 
 
-def test_without_a_folder_for_the_cache_warm_is_refused(refused, compiled, monkeypatch):
+def test_without_a_folder_for_the_cache_warm_is_refused(refused, monkeypatch):
     monkeypatch.setattr("antdrive.base.kernel_cache.cache_folder", lambda: None)
     assert "NUMBA_CACHE_DIR" in refused("warm")
-    assert compiled == []
-
-
-def test_each_group_of_planners_is_known_and_none_is_compiled_twice():
-    names = [name for group in TOGETHER for name in group]
-    assert set(names) <= set(PLANNERS)
-    assert len(set(names)) == len(names)
 
 
 @pytest.mark.parametrize("name", PLANNERS)
 def test_warm_plans_with_every_planner(name):
-    _plan_with([name])
+    plan_with(name)

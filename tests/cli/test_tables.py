@@ -1,16 +1,15 @@
 """Tables and signs on terminals of any width."""
 
-import re
 import sys
 from collections import Counter
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base.tables import LEAST_WRAPPED, table
 from antdrive.cli import console
-from antdrive.cli.console import BAD, GOOD, LEAST_WRAPPED, marked, print_line, table
+from antdrive.cli.console import BAD, GOOD, marked, print_line
 from antdrive.runs.barn_challenge import HEADS, PUBLISHED, PUBLISHED_HEADS, BarnLine
 from antdrive.runs.campaigns.results import MEDIANS
 from antdrive.runs.comparing import COMPARED, Comparison
@@ -116,16 +115,3 @@ def test_streams_that_cannot_encode_the_signs_get_plain_ones(monkeypatch, capsys
     monkeypatch.setattr(console, "_encodes", lambda text: False)
     print_line(f"{GOOD} one, {BAD} other")
     assert capsys.readouterr().out == "+ one, x other\n"
-
-
-def test_every_command_with_a_table_is_here():
-    cli = Path(console.__file__).parent
-    users = {
-        path.stem
-        for path in cli.rglob("*.py")
-        if path.name != "console.py" and re.search(r"\btable\(", path.read_text())
-    }
-    here = {name.partition(":")[0].replace("-", "_") for name in TABLES}
-    assert here <= users
-    lists = {words[0] for words in LISTS}  # `listings` has their tables
-    assert users - {"campaign_tables", "listings"} <= here | lists

@@ -19,13 +19,12 @@ from antdrive.views.pages.reported_runs import REQUIRED
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 SOURCE = ROOT / "src" / "antdrive"
-STUBS = [*sorted(SOURCE.rglob("__init__.pyi")), SOURCE / "testing.pyi"]
+STUBS = sorted(SOURCE.rglob("__init__.pyi"))
 NAMES = re.compile(r"^from (\.[\w.]*) import (\w+)", re.MULTILINE)
 
 
 def package_of(stub):
-    within = stub.relative_to(SOURCE).with_suffix("").parts
-    return ".".join(["antdrive", *(part for part in within if part != "__init__")])
+    return ".".join(["antdrive", *stub.parent.relative_to(SOURCE).parts])
 
 
 PACKAGES = {package_of(stub): stub for stub in STUBS}
@@ -42,13 +41,11 @@ def test_every_package_that_offers_names_has_a_page_in_the_api():
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_constant_that_a_package_offers_has_a_comment(package):
-    stub = PACKAGES[package]
-    base = package if stub.stem == "__init__" else package.rpartition(".")[0]
     module = importlib.import_module(package)
-    for where, name in NAMES.findall(stub.read_text()):
+    for where, name in NAMES.findall(PACKAGES[package].read_text()):
         thing = getattr(module, name)
         if not (inspect.isclass(thing) or inspect.isroutine(thing) or inspect.ismodule(thing)):
-            source = Path(str(importlib.import_module(f"{base}{where}").__file__)).read_text()
+            source = Path(str(importlib.import_module(f"{package}{where}").__file__)).read_text()
             assert re.search(rf"^#: .+\n{name}\b", source, re.MULTILINE), (
                 f"{name} of {where} has no line `#: ...` above it"
             )

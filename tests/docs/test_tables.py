@@ -137,7 +137,7 @@ def test_the_suite_is_read(tmp_path):
 def test_the_suite_and_the_tests_pass(tmp_path):
     (tmp_path / "page.drive.yaml").write_text(block("yaml"))
     (tmp_path / "test_page.py").write_text(block("python"))
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "antdrive.cli.testing.plugin"]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "antdrive.testing.plugin"]
     for words in (["--drive-update"], ["--drive-strict"]):
         done = subprocess.run([*command, *words], cwd=tmp_path, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.cli.console import COMPILING
+from antdrive.base.kernel_cache import COMPILING
 from antdrive.robots import load_robot
 from tests.cli.conftest import antdrive as antdrive  # a fixture
 

@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "regression_suite"
 PAGE = (EXAMPLE / "README.md").read_text()
-PLUGIN = ("-p", "antdrive.cli.testing.plugin", "-p", "no:cacheprovider")
+PLUGIN = ("-p", "antdrive.testing.plugin", "-p", "no:cacheprovider")
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 import hashlib
 import importlib
 import importlib.metadata
-import inspect
 import os
 import re
 import subprocess
@@ -16,7 +15,6 @@ import pytest
 import antdrive.planners
 from antdrive import Scenario
 from antdrive.base import InputError
-from antdrive.cli.compiling import TOGETHER
 from antdrive.planners import (
     PLANNERS,
     AcoHan,
@@ -144,20 +142,6 @@ def test_naming_planners_does_not_load_the_compiler():
 
 
 # Other places that list planners
-
-
-def kernel_modules(planner):
-    """Return the kernel modules imported by the modules of a planner's class and its bases."""
-    sources = (inspect.getsource(sys.modules[kind.__module__]) for kind in type(planner).__mro__[:-1])
-    return {name for source in sources for name in re.findall(r"^ +from [\w.]+ import (_kernels_\w+)", source, re.M)}
-
-
-@pytest.mark.parametrize("name", PLANNERS)
-def test_a_planner_s_kernels_are_compiled_by_a_warm_up_group(name):
-    groups = [names for names in TOGETHER if name in names]
-    # The drive in the warm-up plans with `astar` and `as`, whose kernels other planners also use.
-    known = {kernel for names in (*TOGETHER, ("astar", "as")) for n in names for kernel in kernel_modules(PLANNERS[n])}
-    assert groups or kernel_modules(PLANNERS[name]) <= known, f"add {name} to TOGETHER in cli/compiling.py"
 
 
 @pytest.mark.parametrize("name", PLANNERS)

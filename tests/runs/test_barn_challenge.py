@@ -21,7 +21,15 @@ from hypothesis import strategies as st
 from antdrive.base.errors import InputError
 from antdrive.planners import load_planner
 from antdrive.runs import barn_challenge
-from antdrive.runs.barn_challenge import OFFICIAL, REPORT_TEST, by_map, campaign_data, lines, reference_times, unpacked
+from antdrive.runs.barn_challenge import (
+    OFFICIAL,
+    REPORT_TEST,
+    by_map,
+    by_world,
+    campaign_data,
+    reference_times,
+    unpacked,
+)
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.sim import Scenario, run
@@ -87,7 +95,7 @@ def test_a_failed_run_scores_nothing_and_has_no_time():
             "barn": [0.4, 0.5, 0.0],
         }
     )
-    first, second, everything = lines(table, {"world_0": 4.0})
+    first, second, everything = by_world(table, {"world_0": 4.0})
     assert (first.world, first.runs, first.arrived, first.seconds, first.score) == ("world_0", 2, 1, 10.0, 0.2)
     assert first.exact == 0.25
     assert (second.world, second.exact) == ("world_6", 0.4)

@@ -18,7 +18,7 @@ from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.run_table import REQUIRED, RunTable, merged
 from antdrive.runs.statistics.success import distributions, performance_profiles
 from antdrive.runs.suites import Baseline, Demands, load_suite, scenario_of
-from antdrive.runs.suites.strategies import worlds
+from antdrive.testing.strategies import worlds
 from tests.messages import check_messages, numbered
 from tests.runs.campaigns import test_campaign
 from tests.runs.made_up_campaign import Skill, made_up_columns

@@ -7,7 +7,17 @@ from collections.abc import Iterable
 
 
 class InputError(ValueError):
-    """Invalid user input. The message is one line: where, what, and how to fix it."""
+    """Invalid user input. The message is one line: where, what, and how to fix it.
+
+    Attributes:
+        key: what a person wrote wrongly, such as "planner.ants"; empty if the message says where
+        problem: the message without a place, if there is a key
+    """
+
+    def __init__(self, message: str, key: str = "", problem: str = "") -> None:
+        super().__init__(message)
+        self.key = key
+        self.problem = problem or message
 
 
 class Terminated(SystemExit):
@@ -34,6 +44,10 @@ class FieldError(ValueError):
         """Return the error with the key prefixed by that of its `parent`: "radius" under "robot" is "robot.radius"."""
         dot = "." if parent and self.key and not self.key.startswith("[") else ""
         return FieldError(f"{parent}{dot}{self.key}", self.problem)
+
+    def as_input(self) -> InputError:
+        """Return the error as one of a user's input, with the same key and message."""
+        return InputError(visible(str(self)), self.key, visible(self.problem))
 
 
 def input_error(*parts: str) -> InputError:

@@ -22,6 +22,8 @@ def ignore(name: str) -> None:
     """Ignore that a kernel compiles."""
 
 
+#: What a command prints when its first kernel compiles.
+COMPILING = "compiling planner, drive and film, once per installation: up to 1 min"
 on_compile: Callable[[str], None] = ignore  # called with each kernel's name before it compiles
 blocks = 0  # open blocks of `compiled`
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import shlex
 from collections import Counter, UserDict
 from collections.abc import Iterator, Mapping, Sequence
@@ -66,7 +65,7 @@ def exit_code_of(words: list[str]) -> int:
 def _resuming(words: Sequence[str]) -> str:
     """Return how to resume an interrupted command; empty if it starts over."""
     command = COMMANDS.get(words[0]) if words else None
-    if command is None or not command.resumes:
+    if command is None or "resumes" not in command.marks:
         return ""
     return f"; completed runs are kept, resume with: {shlex.join(['antdrive', *_without_again(words)])}"
 
@@ -98,11 +97,10 @@ class _Commands(UserDict[str, Any]):
     def __getitem__(self, name: str) -> Any:
         command = self.data[name]
         if isinstance(command, Command):
-            module = importlib.import_module(f"antdrive.cli.commands.{command.module}")
             alone = typer.Typer(**SETTINGS)
-            function = getattr(module, command.function)
-            function = with_physics(function) if command.drives else function
-            alone.command(name, cls=_Panelled)(with_plan_limit(function) if command.plans else function)
+            function = command.function(name)
+            function = with_physics(function) if "drives" in command.marks else function
+            alone.command(name, cls=_Panelled)(with_plan_limit(function) if "plans" in command.marks else function)
             command = self.data[name] = typer.main.get_command(alone)
             for one in command.params:
                 if one.param_type_name == "option" and one.name in SHORT:
@@ -122,6 +120,14 @@ class _Panelled(typer.core.TyperCommand):
                 f"{'/'.join((*twice.opts[:1], *twice.secondary_opts))}: given {given[twice]} times; keep one"
             )
         return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; raise InputError for a wrong value, with its option."""
+        try:
+            return super().invoke(ctx)
+        except FieldError as error:
+            flag = next((one.opts[0] for one in self.params if one.name == error.key), error.key)
+            raise InputError(f"{flag}: {error.problem}") from error
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the arguments, then the options of each panel."""

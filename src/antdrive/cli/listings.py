@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from antdrive.base.optional import PLANNER_GROUP
-from antdrive.cli.console import table
+from antdrive.base.tables import table
 
 Row = Sequence[str]
 Rows = Iterable[Row]

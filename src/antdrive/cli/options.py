@@ -7,8 +7,9 @@ import dataclasses
 import functools
 import inspect
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
 import typer
@@ -20,6 +21,7 @@ from antdrive.cli.parse import disc
 from antdrive.sim.settings import SETTINGS, DeclaredSetting
 
 Command = Callable[..., Any]
+NONE: Mapping[str, str] = MappingProxyType({})
 
 
 def argument(metavar: str, text: str) -> Any:
@@ -37,7 +39,9 @@ def flag(text: str, *flags: str, panel: str | None = None) -> Any:
     return option("", text, *flags, panel=panel)
 
 
-def with_settings(names: Iterable[str] = (), *, many: bool = False, **defaults: Any) -> Callable[[Command], Command]:
+def with_settings(
+    names: Iterable[str] = (), *, many: bool = False, usual: Mapping[str, str] = NONE, **defaults: Any
+) -> Callable[[Command], Command]:
     """Return a decorator that adds scenario settings to a command as options.
 
     The command receives the settings by key, in the form of files. A parameter whose type is a record becomes one option per
@@ -46,6 +50,7 @@ def with_settings(names: Iterable[str] = (), *, many: bool = False, **defaults: 
     Args:
         names: scenario fields
         many: whether options may be repeated; the command then receives lists, and only options that were given
+        usual: texts of defaults that other options decide, by field name; the command receives None
         defaults: by field name, where they differ from the scenario's
     """
     chosen = {SETTINGS[name].key: SETTINGS[name] for name in names}
@@ -64,7 +69,7 @@ def with_settings(names: Iterable[str] = (), *, many: bool = False, **defaults: 
             return command(**values, **{key: value for key, value in given.items() if not many or value})
 
         flat = [one for each in parameters for one in records.get(each.name, [each])]
-        flat += [_parameter(one, many, defaults) for one in chosen.values()]
+        flat += [_parameter(one, many, usual, defaults) for one in chosen.values()]
         called.__signature__ = own.replace(  # type: ignore[attr-defined]
             parameters=[one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in flat]
         )
@@ -119,7 +124,9 @@ def _fields(record: inspect.Parameter) -> list[inspect.Parameter]:
     ]
 
 
-def _parameter(one: DeclaredSetting, many: bool, defaults: dict[str, Any]) -> inspect.Parameter:
+def _parameter(
+    one: DeclaredSetting, many: bool, usual: Mapping[str, str], defaults: dict[str, Any]
+) -> inspect.Parameter:
     """Return the typer parameter of a setting's option."""
     setting = one.setting
     text = setting.help[0].upper() + setting.help[1:]
@@ -131,14 +138,15 @@ def _parameter(one: DeclaredSetting, many: bool, defaults: dict[str, Any]) -> in
     elif setting.form == "margin":
         kind = str
     elif setting.form == "plain":
-        default = defaults.get(one.name, one.default)
+        default = None if one.name in usual else defaults.get(one.name, one.default)
     else:
         kind = list[str] if setting.form == "discs" else str
     if many:
         kind, default = list[kind], None
     repeated = " Repeatable." if many or setting.form == "discs" else ""
-    usual = f"  [default: {setting.usual}]" if setting.usual and not many else ""
-    made = option(setting.metavar, f"{text}.{repeated}{usual}", flags, panel=setting.group)
+    said = usual.get(one.name, setting.usual)
+    shown = f"  [default: {said}]" if said and not many else ""
+    made = option(setting.metavar, f"{text}.{repeated}{shown}", flags, panel=setting.group)
     annotation: Any = Annotated[kind | None if default is None else kind, made]
     return inspect.Parameter(one.key, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 

@@ -230,6 +230,21 @@ class PlanResult:
         """The polyline to drive as fractional (row, col) (M, 2): `waypoints` if there are any, else `cells`."""
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return the plan as plain values, without history and field."""
+        return {
+            "status": self.status.name.lower(),
+            "sentence": self.status.value,
+            "reason": self.reason,
+            "cost_m": self.cost,
+            "length_m": self.line_length,
+            "work": self.work,
+            "work_unit": self.work_unit,
+            "plan_s": self.wall_s,
+            "options": {key: plain(value) for key, value in self.options.items()},
+            "cells": self.cells.tolist(),
+        }
+
     def __repr__(self) -> str:
         path = f" of {format_fixed(self.line_length, 3)} m" if len(self.cells) else ""
         reason = f" ({self.reason:.200})" if self.reason else ""
@@ -330,6 +345,11 @@ class Planner(Protocol):
     def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         """Find a path from the start cell to the goal cell."""
         ...
+
+
+def plain(value: Any) -> Any:
+    """Convert a planner's option to a JSON value."""
+    return value if isinstance(value, bool | int | float | str | None) else str(value)
 
 
 def capabilities_of(planner: Planner) -> Capabilities:

@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field, create_model, model_validator
 from antdrive.base.caches import cached
 from antdrive.base.checks import OneLine, SchemaVersion, check, file_schema, resolve
 from antdrive.base.document import parse_document, read_yaml
-from antdrive.base.errors import FieldError, input_error
+from antdrive.base.errors import FieldError, InputError, input_error, visible
 from antdrive.base.records import STRICT
 from antdrive.robots.outline import MAX_CORNERS
 from antdrive.robots.spec import Footprint, RobotSpec, require_feasible
@@ -96,19 +96,20 @@ def list_robots() -> Mapping[str, Path]:
     return {path.stem: path for path in sorted(_CATALOG.glob("*.yaml"))}
 
 
-def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
+def load_robot(robot: str | os.PathLike[str], home: Path | None = None) -> RobotSpec:
     """Load a robot's specification.
 
     Args:
         robot: a file's path, or a name from `list_robots`
+        home: base of relative paths; None: the working directory
 
     Raises:
         InputError: the file does not exist or is invalid.
     """
     try:
-        path = resolve("robot", robot, list_robots())
+        path = resolve("robot", robot, list_robots(), home)
     except FieldError as error:
-        raise input_error(error.problem) from None
+        raise InputError(visible(error.problem), error.key) from None
     if path.suffix.lower() in (".urdf", ".xacro"):
         raise input_error(str(path), f"not a robot file; convert it with: antdrive robots import {path}")
     return robot_from_text(read_yaml(path), os.fspath(path), path.stem)

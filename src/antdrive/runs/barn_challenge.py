@@ -13,7 +13,7 @@ import tarfile
 import tempfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import IO, TYPE_CHECKING, Any
@@ -23,12 +23,15 @@ import numpy as np
 from antdrive.base.errors import InputError, input_error
 from antdrive.base.files import format_size, open_regular
 from antdrive.base.plane import polyline_length
+from antdrive.base.tables import table
 from antdrive.base.types import Point
 from antdrive.sim.log.metrics import BARN_SPEED
 from antdrive.worlds.formats.barn import BARN_CELL, BARN_GOAL, BARN_START
 
 if TYPE_CHECKING:
     import pyarrow
+
+    from antdrive.runs.statistics.price import Price
 
 WORLDS, PATHS = "world_*.world", "path_*.npy"
 FIELD = (-4.575, 5.075)  # cell (0, 0) of a reference path by the scripts [m]; its cylinders: 0.15 and 0.1 m farther
@@ -136,6 +139,63 @@ class BarnLine:
         )
 
 
+@dataclass(frozen=True)
+class BarnTable:
+    """The results in the challenge's worlds, beside published ones."""
+
+    rows: Sequence[BarnLine]  # one for each world, and one for all
+    known: BarnLine | None  # all worlds with the map; None if it was not driven with
+    price: Price | None  # the cost of driving without the map; None likewise
+
+    @classmethod
+    def of(cls, runs: pyarrow.Table, fastest: Mapping[str, float], map: str, *, with_map: bool) -> BarnTable:
+        """Return the results of a campaign's runs.
+
+        Args:
+            runs: the runs
+            fastest: OT [s] by the world's name
+            map: the robot's map, `none` or `given`
+            with_map: whether the runs with the map are partners of those without it
+        """
+        from antdrive.runs.statistics.price import prices
+        from antdrive.runs.statistics.run_table import RunTable
+
+        rows = list(by_world(by_map(runs)[map], fastest))
+        if not with_map:
+            return cls(rows, None, None)
+        (price,) = prices(RunTable(runs.to_pydict()))
+        return cls(rows, list(by_world(by_map(runs)["given"], fastest))[-1], price)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the results as plain values."""
+        facts = {"note": OURS, "worlds": [vars(row) for row in self.rows[:-1]], "all": vars(self.rows[-1])}
+        facts["published"] = [vars(entry) for entry in PUBLISHED]
+        if self.known and self.price:
+            facts |= {"with_map": vars(self.known), "price_of_not_knowing": self.price.as_dict()}
+        return facts
+
+    def lines(self) -> Iterator[str]:
+        """Yield the results as a table for people."""
+        known = [replace(self.known, world="all, with the map")] if self.known else []
+        yield from table(HEADS, (row.cells for row in (*self.rows, *known)))
+        yield f"score: {FORMULA}"
+        yield "exact score: T = length of the exact shortest path / 2 m/s in place of OT"
+        yield ""
+        if self.price:
+            yield self.price.sentence
+            yield ""
+        yield from published_lines()
+        yield ""
+        yield OURS
+
+
+def published_lines() -> Iterator[str]:
+    """Yield the published results and their sources as lines."""
+    yield from table(PUBLISHED_HEADS, (entry.cells for entry in PUBLISHED))
+    for source in dict.fromkeys(entry.source for entry in PUBLISHED):
+        yield f"  {', '.join(entry.who for entry in PUBLISHED if entry.source == source)}: {source}"
+
+
 def unpacked(source: Path, folder: Path, wanted: str = WORLDS) -> Path:
     """Return the folder with the worlds (or the wanted files) of a folder or archive; unpack an archive."""
     archives = sorted(source.glob("*.tar.*")) if source.is_dir() else [source]
@@ -236,15 +296,15 @@ def reference_times(folder: Path, formula: Formula = OFFICIAL) -> dict[str, floa
     return times
 
 
-def by_map(table: pyarrow.Table) -> dict[str, pyarrow.Table]:
+def by_map(runs: pyarrow.Table) -> dict[str, pyarrow.Table]:
     """Split the runs by the robot's map: `none` and `given`."""
-    maps = table["map"].to_pylist()
-    return {kind: table.filter([one == kind for one in maps]) for kind in ("none", "given")}
+    maps = runs["map"].to_pylist()
+    return {kind: runs.filter([one == kind for one in maps]) for kind in ("none", "given")}
 
 
-def lines(table: pyarrow.Table, fastest: Mapping[str, float]) -> Iterator[BarnLine]:
+def by_world(runs: pyarrow.Table, fastest: Mapping[str, float]) -> Iterator[BarnLine]:
     """Yield the results world by world, then those of all worlds."""
-    rows = table.select(["world", "succeeded", "arrival_s", "barn"]).to_pylist()
+    rows = runs.select(["world", "succeeded", "arrival_s", "barn"]).to_pylist()
     worlds = {row["world"]: [other for other in rows if other["world"] == row["world"]] for row in rows}
     for world in sorted(worlds, key=lambda name: (len(name), name)):
         yield _line(world, worlds[world], fastest)

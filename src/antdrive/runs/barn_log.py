@@ -14,10 +14,20 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from antdrive.base.errors import InputError, few, input_error
 from antdrive.base.files import read_bytes
-from antdrive.runs.barn_challenge import Formula
+from antdrive.base.tables import table
+from antdrive.runs.barn_challenge import (
+    FORMULA,
+    FORMULA_SOURCE,
+    FORMULAS,
+    OFFICIAL,
+    PUBLISHED,
+    Formula,
+    published_lines,
+)  # fmt: skip
 
 MAX_LOG_BYTES = 10_000_000
 PUBLIC = range(0, 300, 6)  # numbers of the public worlds
@@ -52,6 +62,29 @@ class LogScore:
     seconds: float  # mean time of the trials at the goal [s]; NaN if there are none
     gaps: tuple[str, ...]  # what the log lacks of 50 worlds x 10 trials, or has beyond them
     notes: tuple[str, ...]  # lines that contradict the formula or repeat others
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the score, the formulas and published results as plain values."""
+        known = {"formula": FORMULA, "formulas": [vars(one) for one in FORMULAS], "source": FORMULA_SOURCE}
+        return {**vars(self), **known, "published": [vars(entry) for entry in PUBLISHED]}
+
+    def lines(self, log: Path) -> Iterator[str]:
+        """Yield the score of a log, what it lacks, and published results, as lines."""
+        yield f"score {self.scores[OFFICIAL.name]:.4f}  {log}: {self.trials} trials, worlds: {self.worlds}"
+        time = "" if math.isnan(self.seconds) else f", mean time {self.seconds:.4f} s"
+        ends = {"succeeded": self.success, "collided": self.collided, "timed out": self.timed_out}
+        yield f"  {', '.join(f'{100 * share:.1f} % {words}' for words, share in ends.items())}{time}"
+        yield from (f"  incomplete: {gap}" for gap in self.gaps)
+        yield from (f"  note: {note}" for note in self.notes)
+        yield ""
+        rows = ((one.name, f"{self.scores[one.name]:.4f}", f"{1 / one.least:.2f}", one.source) for one in FORMULAS)
+        yield from table(("clip", "mean score", "at most", "used by"), rows)
+        yield ""
+        yield f"score: {FORMULA}"
+        yield "means over worlds of the means over a world's trials"
+        yield f"source: {FORMULA_SOURCE}"
+        yield ""
+        yield from published_lines()
 
 
 def read_log(path: Path) -> list[Trial]:

@@ -1,3 +1,5 @@
+from .fitting import Fit as Fit
+from .fitting import fit as fit
 from .log.certificate import Certificate as Certificate
 from .log.certificate import certify as certify
 from .log.metrics import METRICS as METRICS
@@ -11,5 +13,6 @@ from .pipeline import plan as plan
 from .pipeline import run as run
 from .policy import Perception as Perception
 from .policy import ReplanPolicy as ReplanPolicy
-from .rebuild import rebuilt as rebuilt
 from .scenario import Scenario as Scenario
+from .written import Written as Written
+from .written import rebuilt as rebuilt

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +44,10 @@ class Door:
     rooms: tuple[int, int]
     passed: bool = False
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return the door as plain values."""
+        return {"width": self.width, "at": list(self.at), "passed": self.passed}
+
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
@@ -73,6 +78,11 @@ class Coverage:
     def room_count(self) -> int:
         """The number of rooms."""
         return int(self.rooms.max(initial=-1)) + 1
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return share, rooms and doors as plain values."""
+        rooms = {"rooms": self.room_count, "rooms_reached": len(self.rooms_reached)}
+        return {"share": self.share, **rooms, "doors": [door.as_dict() for door in self.doors]}
 
 
 def reached_cells(grid: Grid, ends: Iterable[Point]) -> Cells:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.errors import InputError, require
+from antdrive.base.errors import FieldError, require
 from antdrive.base.types import Floats, Point
 from antdrive.worlds import _kernels, _kernels_turns
 from antdrive.worlds._kernels_turns import HEADINGS, MoveGraph
@@ -209,12 +209,13 @@ def rasterise(world: World, cell: float, inflate: float = 0.0, outline: Outline 
         FieldError: the inflation is negative.
     """
     if not cell > 0:
-        raise InputError(f"cell: must be greater than 0, got {cell:g}")
+        raise FieldError("cell", f"must be greater than 0, got {cell:g}").as_input()
     require("inflate", inflate, at_least=0)
     width, height = world.size
     rows, cols = (max(1, math.ceil(side / cell - 1e-9)) for side in (height, width))
     if rows * cols > MAX_CELLS:
-        raise InputError(f"cell: {cell:g} m cuts this world into {rows} x {cols} cells; the limit is {MAX_CELLS}")
+        problem = f"{cell:g} m cuts this world into {rows} x {cols} cells; the limit is {MAX_CELLS}"
+        raise FieldError("cell", problem).as_input()
     free = np.empty((rows, cols), dtype=np.bool_)
     closed = np.zeros((rows, cols), dtype=np.uint8)
     x0, y0 = world.bounds[0] + cell / 2, world.bounds[1] + cell / 2

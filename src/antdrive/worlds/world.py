@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -250,6 +251,21 @@ class Task:
             if math.hypot(x - mx, y - my) <= motion.radius:
                 where = f"movers[{i}], which starts {format_disc(mx, my, motion.radius)}"
                 raise FieldError("start", f"{format_point((x, y))} is inside {where}")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the task as plain values, with the numbers of the world's obstacles and movers."""
+        return {
+            "name": self.world.name,
+            "source": self.world.source,
+            "bounds": list(self.world.bounds),
+            "start": list(self.start),
+            "goal": list(self.goal),
+            "goal_tolerance": self.goal_tolerance,
+            "cell": self.cell,
+            **({"frame": list(self.frame)} if any(self.frame) else {}),
+            "obstacles": len(self.world.obstacles),
+            "movers": len(self.world.movers),
+        }
 
     def _repr_html_(self) -> str:
         world = self.world

@@ -54,6 +54,14 @@ def test_a_failure_is_listed_with_its_film_or_its_log(driven, antdrive, monkeypa
     assert ends == [f"  world_0, seed 0: collided  obstacles[3]  {end}" for end in ("rollouts/b.npz", "b.mp4")]
 
 
+def test_the_localisation_follows_the_map(driven, antdrive, monkeypatch):
+    given = []
+    monkeypatch.setattr(campaign, "make_campaign", lambda data, **_words: given.extend(data["settings"]))
+    for words in ((), ("--map", "given")):
+        antdrive("barn", driven, *words)
+    assert [each["localisation"] for each in given] == ["matching", "fixes"]
+
+
 @pytest.fixture
 def log(tmp_path):
     """A log with two of its trials, beside the path file of its world: cells straight ahead, OT 5 s."""

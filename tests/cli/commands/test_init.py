@@ -15,7 +15,7 @@ from antdrive.base import atomic
 from antdrive.base.version import __version__
 from antdrive.cli.commands.init import FILES, TEMPLATE
 
-PLUGIN = ("-p", "antdrive.cli.testing.plugin", "-p", "no:cacheprovider")
+PLUGIN = ("-p", "antdrive.testing.plugin", "-p", "no:cacheprovider")
 
 
 def python(folder, *words):

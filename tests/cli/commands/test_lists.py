@@ -31,6 +31,27 @@ def test_every_planner_is_listed_with_its_options(antdrive):
     assert antdrive("planners", "acohan")[0] == 2
 
 
+def test_a_planner_of_ones_own_is_described_as_built_in_ones_are(antdrive, tmp_path):
+    own = [
+        "class Mine(AStar):",
+        '    """My own search.',
+        "",
+        "    Attributes:",
+        "        eagerness: its zeal",
+        '    """',
+    ]
+    lines = [
+        "from dataclasses import dataclass",
+        "from antdrive.planners import AStar",
+        "@dataclass(frozen=True, kw_only=True)",
+    ]
+    (tmp_path / "mine.py").write_text("\n".join([*lines, *own, "    eagerness: float = 2.0"]))
+    code, out, err = antdrive("planners", "mine.py:Mine")
+    assert (code, err) == (0, "")
+    assert out.startswith("mine.py:Mine: My own search.\n")
+    assert re.search("^eagerness +2.0 +its zeal$", out, re.MULTILINE)
+
+
 @pytest.mark.parametrize("words", LISTS, ids=" ".join)
 def test_a_list_prints_what_its_command_prints(antdrive, capsys, words):
     code = exit_code_of(list(words))
@@ -87,6 +108,10 @@ def test_show_reports_whether_a_robot_can_cross(antdrive, tmp_path):
     assert code == 0
     assert re.search("^passable +yes, for turtlebot with", out, re.MULTILINE)
     assert (tmp_path / "gate.png").exists()
+    margins = [
+        json.loads(antdrive("worlds", "show", "gate", "--noise", noise, "--json")[1])["margin"] for noise in "05"
+    ]
+    assert margins[0] == 0.03 < margins[1]
     assert not json.loads(antdrive("worlds", "show", "no-path", "--json")[1])["passable"]
     assert re.search(
         "^reason +no path for a disc of 0.21 m .*not even a point", antdrive("worlds", "show", "no-path")[1], re.M

@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from antdrive.cli.testing.evaluation import check_case
 from antdrive.planners import load_planner
 from antdrive.robots import Avoidance, PurePursuit, load_robot
 from antdrive.runs.failures.failure import Attempt
@@ -24,6 +23,7 @@ from antdrive.runs.suites.suite import load_suite
 from antdrive.sim import Certificate, Perception, ReplanPolicy, Scenario
 from antdrive.sim.log.record import MarginRecord
 from antdrive.sim.scenario import MarginChoice
+from antdrive.testing.evaluation import check_case
 from antdrive.worlds import Disc
 
 

@@ -6,20 +6,25 @@ The modules omit `from __future__ import annotations`: typer needs the annotatio
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import importlib
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class Command(NamedTuple):
-    """Location and summary of a command, known before its module is imported."""
+    """Summary and place of a command, known before its module is imported."""
 
-    module: str  # below `antdrive.cli.commands`
-    function: str  # in the module
     summary: str  # first line of the function's docstring
-    resumes: bool = False  # whether the same command resumes an interrupted one
-    plans: bool = False  # whether it plans, and takes --plan-limit
-    drives: bool = False  # whether it always drives, and refuses to start without PyBullet
+    marks: str = ""  # "plans": takes --plan-limit; "drives": needs PyBullet to start; "resumes": continues if repeated
+    place: str = ""  # MODULE.FUNCTION in this package; else both are called as the command
+
+    def function(self, name: str) -> Callable[..., Any]:
+        """Import and return the function of the command with this name."""
+        own = name.replace("-", "_")
+        module, _, function = (self.place or f"{own}.{own}").partition(".")
+        found: Callable[..., Any] = getattr(importlib.import_module(f"{__name__}.{module}"), function)
+        return found
 
 
 ABOUT = """Plan paths, drive them in physics, certify the drives and film them.
@@ -33,78 +38,48 @@ DEBUG = "--debug"  # accepted anywhere, so it can be appended to a failed comman
 #: Commands by name, in the order of `antdrive --help`.
 COMMANDS: Mapping[str, Command] = MappingProxyType(
     {
-        "demo": Command("demo", "demo", "Film ants beside A*: both plan, drive and are certified.", drives=True),
-        "init": Command(
-            "init", "init", "Write a suite, a robot, a world, a Python test and a GitHub workflow that pass."
-        ),
-        "run": Command(
-            "run", "run", "Plan a path, drive it in physics and certify the drive.", plans=True, drives=True
-        ),
-        "plan": Command("plan", "plan", "Plan a path without driving it.", plans=True),
-        "compare": Command("compare", "compare", "Compare planners on worlds or from campaign results.", plans=True),
-        "sweep": Command(
-            "sweep", "sweep", "Run a campaign: every combination of its settings.", resumes=True, plans=True
-        ),
-        "barn": Command("barn", "barn", "Drive the BARN Challenge worlds, or score a log.", resumes=True, plans=True),
-        "render": Command("render", "render", "Render films of logged drives from any camera."),
-        "report": Command("report", "report", "Write a report on many runs or on a campaign."),
-        "export": Command("export", "export_drive", "Export a drive to Foxglove, RViz or CSV."),
-        "verify": Command("verify", "verify", "Re-certify drives from their logs alone."),
-        "check": Command(
-            "check",
-            "check",
-            "Run suites or Python tests, and compare the drives with their baselines.",
-            plans=True,
-            drives=True,
-        ),
+        "demo": Command("Film ants beside A*: both plan, drive and are certified.", "drives"),
+        "init": Command("Write a suite, a robot, a world, a Python test and a GitHub workflow that pass."),
+        "run": Command("Plan a path, drive it in physics and certify the drive.", "plans drives"),
+        "plan": Command("Plan a path without driving it.", "plans"),
+        "compare": Command("Compare planners on worlds or from campaign results.", "plans"),
+        "sweep": Command("Run a campaign: every combination of its settings.", "resumes plans"),
+        "barn": Command("Drive the BARN Challenge worlds, or score a log.", "resumes plans"),
+        "render": Command("Render films of logged drives from any camera."),
+        "report": Command("Write a report on many runs or on a campaign."),
+        "export": Command("Export a drive to Foxglove, RViz or CSV."),
+        "verify": Command("Re-certify drives from their logs alone."),
+        "check": Command("Run suites or Python tests, and compare the drives with their baselines.", "plans drives"),
         "accept": Command(
-            "check",
-            "accept",
-            "Run suites or Python tests, and save the drives as baselines.",
-            plans=True,
-            drives=True,
+            "Run suites or Python tests, and save the drives as baselines.", "plans drives", place="check.accept"
         ),
-        "margin": Command("margin", "margin", "Break down a drive's safety margin by cause."),
-        "find-margin": Command(
-            "find_margin",
-            "find_margin",
-            "Find the smallest margin at which all drives are safe.",
-            plans=True,
-            drives=True,
-        ),
-        "falsify": Command(
-            "falsify", "falsify", "Search for worlds in which a configuration fails.", plans=True, drives=True
-        ),
-        "shrink": Command(
-            "shrink", "shrink", "Reduce a failure to a minimal reproducer.", resumes=True, plans=True, drives=True
-        ),
-        "reproduce": Command(
-            "reproduce", "reproduce", "Repeat a paper's experiments and test its claims.", resumes=True, plans=True
-        ),
-        "planners": Command("planners", "planners", "List the planners, or describe some with their options."),
-        "controller": Command(
-            "controller", "controller", "List the options of the controller with default, unit and meaning."
-        ),
-        "schema": Command("schema", "schema", "Print the JSON Schema of a file type."),
-        "warm": Command("warm", "warm", "Compile all planners ahead of time."),
+        "margin": Command("Break down a drive's safety margin by cause."),
+        "find-margin": Command("Find the smallest margin at which all drives are safe.", "plans drives"),
+        "falsify": Command("Search for worlds in which a configuration fails.", "plans drives"),
+        "shrink": Command("Reduce a failure to a minimal reproducer.", "resumes plans drives"),
+        "reproduce": Command("Repeat a paper's experiments and test its claims.", "resumes plans"),
+        "planners": Command("List the planners, or describe some with their options."),
+        "controller": Command("List the options of the controller with default, unit and meaning."),
+        "schema": Command("Print the JSON Schema of a file type."),
+        "warm": Command("Compile all planners ahead of time."),
     }
 )
 WORLDS: Mapping[str, Command] = MappingProxyType(
     {
-        "list": Command("worlds", "list_worlds", "List the worlds in the catalogue."),
-        "show": Command("worlds", "show_world", "Describe a world and check whether a robot can cross it."),
-        "generate": Command("worlds", "generate_world", "Generate a random world."),
-        "import": Command("worlds", "import_world", "Convert another program's world or map to a world file."),
-        "export": Command("worlds", "export_world", "Export a world to another program."),
+        "list": Command("List the worlds in the catalogue.", place="worlds.list_worlds"),
+        "show": Command("Describe a world and check whether a robot can cross it.", place="worlds.show_world"),
+        "generate": Command("Generate a random world.", place="worlds.generate_world"),
+        "import": Command("Convert another program's world or map to a world file.", place="worlds.import_world"),
+        "export": Command("Export a world to another program.", place="worlds.export_world"),
     }
 )
 #: `antdrive robots` lists; `antdrive robots NAME` prints.
 ROBOTS: Mapping[str, Command] = MappingProxyType(
     {
-        "list": Command("robots", "list_all", "List the robots in the catalogue."),
-        "print": Command("robots", "print_robot", "Print the file of a catalogue robot, as a template."),
-        "show": Command("robots", "show_robot", "Describe a robot and draw it from above."),
-        "import": Command("robots", "import_robot", "Create a robot file from a differential-drive robot's URDF."),
+        "list": Command("List the robots in the catalogue.", place="robots.list_all"),
+        "print": Command("Print the file of a catalogue robot, as a template.", place="robots.print_robot"),
+        "show": Command("Describe a robot and draw it from above.", place="robots.show_robot"),
+        "import": Command("Create a robot file from a differential-drive robot's URDF.", place="robots.import_robot"),
     }
 )
 #: Command groups with their summaries.

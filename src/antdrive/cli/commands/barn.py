@@ -1,8 +1,6 @@
 """`antdrive barn`."""
 
-import dataclasses
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,23 +9,20 @@ from antdrive.base.errors import InputError
 from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.campaign_options import OPTIONS
-from antdrive.cli.console import bar, campaign_bar, print_error, show, table
+from antdrive.cli.console import bar, campaign_bar, print_error, show
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
-    from antdrive.runs.barn_challenge import BarnLine
-    from antdrive.runs.barn_log import LogScore
     from antdrive.runs.campaigns.results import SweepResults
-    from antdrive.runs.statistics.price import Price
 
 
 @options.with_settings(
     ("noise", *(name for name, one in SETTINGS.items() if one.setting.group == "Sensing")),
     noise=1.0,
     map="none",
-    localisation="matching",
+    usual={"localisation": "matching; fixes with --map given"},
 )
 def barn(
     source: Annotated[
@@ -64,41 +59,26 @@ def barn(
     from antdrive.runs import barn_challenge as challenge
     from antdrive.runs.campaigns.campaign import make_campaign
     from antdrive.runs.campaigns.sweeping import sweep
-    from antdrive.runs.statistics.price import prices
-    from antdrive.runs.statistics.run_table import RunTable
 
-    map = given["map"]
-    if with_map and map != "none":
+    kind = given["map"]
+    if with_map and kind != "none":
         raise InputError("--with-map: needs --map none")
     parquet_library()
     load_planner(planner)  # an invalid one leaves no folder
     load_robot(robot)
     folder = challenge.unpacked(source, out / "worlds")
-    if map == "given" and given["localisation"] == "matching":
-        given["localisation"] = "fixes"
-        print_error("localisation: fixes, because matching needs --map none")
+    given["localisation"] = given["localisation"] or ("fixes" if kind == "given" else "matching")
     data = challenge.campaign_data(folder, trials, planner, robot, given, with_map=with_map)
     campaign = make_campaign(data, source="barn", options={**OPTIONS, "seeds": "--trials", "planners": "--planner"})
     fastest = challenge.reference_times(folder)
     with campaign_bar("driving") as progress:
         results = sweep(campaign, out / "runs", jobs=jobs, keep="failed", progress=progress, notify=print_error)
-    runs = challenge.by_map(results.table)
-    rows = list(challenge.lines(runs[map], fastest))
-    known = list(challenge.lines(runs["given"], fastest))[-1] if with_map else None
-    (price,) = prices(RunTable(results.table.to_pydict())) if with_map else (None,)
+    found = challenge.BarnTable.of(results.table, fastest, kind, with_map=with_map)
     if not json:
-        show(json, None, _lines(rows, known, price))  # before filming, which is slow and may fail
+        show(json, None, found.lines())  # before filming, which is slow and may fail
     filmed = _films(results, out / "films") if films else {}
-    facts = {
-        "folder": str(results.folder),
-        "note": challenge.OURS,
-        "worlds": [vars(line) for line in rows[:-1]],
-        "all": vars(rows[-1]),
-        "published": [vars(entry) for entry in challenge.PUBLISHED],
-        "films": [str(path) for path in filmed.values()],
-        **({"with_map": vars(known), "price_of_not_knowing": price.as_dict()} if known and price else {}),
-    }
-    failed = (row for row in runs[map].to_pylist() if not row["succeeded"])
+    facts = {"folder": str(results.folder), **found.as_dict(), "films": [*map(str, filmed.values())]}
+    failed = (row for row in challenge.by_map(results.table)[kind].to_pylist() if not row["succeeded"])
     show(json, facts, (_failure_line(row, filmed) for row in failed))
     return print_faults(results.faults) or results.complete
 
@@ -112,45 +92,8 @@ def _score(source: Path, log: Path, json: bool) -> bool:
     with TemporaryDirectory() as temporary:
         folder = challenge.unpacked(source, Path(temporary), challenge.PATHS)
         result = score_log(trials, {one: challenge.reference_times(folder, one) for one in challenge.FORMULAS})
-    facts = {
-        **vars(result),
-        "formula": challenge.FORMULA,
-        "formulas": [vars(one) for one in challenge.FORMULAS],
-        "source": challenge.FORMULA_SOURCE,
-        "published": [vars(entry) for entry in challenge.PUBLISHED],
-    }
-    show(json, facts, _score_lines(log, result))
+    show(json, result.as_dict(), result.lines(log))
     return not result.gaps
-
-
-def _score_lines(log: Path, result: "LogScore") -> Iterator[str]:
-    from antdrive.runs import barn_challenge as challenge
-
-    yield f"score {result.scores[challenge.OFFICIAL.name]:.4f}  {log}: {result.trials} trials, worlds: {result.worlds}"
-    time = "" if math.isnan(result.seconds) else f", mean time {result.seconds:.4f} s"
-    ends = zip((result.success, result.collided, result.timed_out), ("succeeded", "collided", "timed out"), strict=True)
-    yield f"  {', '.join(f'{100 * share:.1f} % {words}' for share, words in ends)}{time}"
-    yield from (f"  incomplete: {gap}" for gap in result.gaps)
-    yield from (f"  note: {note}" for note in result.notes)
-    yield ""
-    rows = (
-        (one.name, f"{result.scores[one.name]:.4f}", f"{1 / one.least:.2f}", one.source) for one in challenge.FORMULAS
-    )
-    yield from table(("clip", "mean score", "at most", "used by"), rows)
-    yield ""
-    yield f"score: {challenge.FORMULA}"
-    yield "means over worlds of the means over a world's trials"
-    yield f"source: {challenge.FORMULA_SOURCE}"
-    yield ""
-    yield from _published()
-
-
-def _published() -> Iterator[str]:
-    from antdrive.runs.barn_challenge import PUBLISHED, PUBLISHED_HEADS
-
-    yield from table(PUBLISHED_HEADS, (entry.cells for entry in PUBLISHED))
-    for source in dict.fromkeys(entry.source for entry in PUBLISHED):
-        yield f"  {', '.join(entry.who for entry in PUBLISHED if entry.source == source)}: {source}"
 
 
 def _films(results: "SweepResults", folder: Path) -> dict[str, Path]:
@@ -159,22 +102,6 @@ def _films(results: "SweepResults", folder: Path) -> dict[str, Path]:
 
     with bar("filming failures") as progress:
         return film_failures(results.table.to_pylist(), results.folder, folder, progress=progress)
-
-
-def _lines(rows: "Sequence[BarnLine]", known: "BarnLine | None", price: "Price | None") -> Iterator[str]:
-    from antdrive.runs.barn_challenge import FORMULA, HEADS, OURS
-
-    listed = [*rows, *([dataclasses.replace(known, world="all, with the map")] if known else [])]
-    yield from table(HEADS, (line.cells for line in listed))
-    yield f"score: {FORMULA}"
-    yield "exact score: OT = length of the exact shortest path / 2 m/s"
-    yield ""
-    if price:
-        yield price.sentence
-        yield ""
-    yield from _published()
-    yield ""
-    yield OURS
 
 
 def _failure_line(row: Mapping[str, Any], films: Mapping[str, Path]) -> str:

@@ -13,12 +13,11 @@ from antdrive.cli.options import argument, flag, option
 from antdrive.cli.scenario_options import with_chosen_margin
 
 if TYPE_CHECKING:
-    from antdrive.cli.testing.evaluation import CheckResult, Update
+    from antdrive.testing.evaluation import CheckResult, Update
     from antdrive.views.artefacts import Films, Results
 
 Suites = Annotated[
-    list[str],
-    argument("SUITE", "Suite (*.drive.yaml), test_*.py, folder, SUITE::scenario[seed] or FILE.py::test."),
+    list[str], argument("SUITE", "Suite (*.drive.yaml), test_*.py, folder, SUITE::scenario[seed] or FILE.py::test.")
 ]
 Only = Annotated[str | None, option("PATTERN", "Run only matching scenarios, such as 'aisle-*'.")]
 ResultsFolder = Annotated[Path | None, option("FOLDER", "Folder for logs, figures, films.  [default: user cache]")]
@@ -39,7 +38,7 @@ def check(
 
     Exit code 0: every drive meets its suite's expectations and is no worse than its baseline.
     """
-    from antdrive.cli.testing.session_summary import add_to_page, drives_in, properties, save_junit
+    from antdrive.testing.session_summary import add_to_page, drives_in, properties, save_junit
 
     outcomes, unused = drive_tests(tests, only, jobs, "", results, film, json=json)
     if junit is not None:
@@ -76,9 +75,9 @@ def drive_tests(
     json: bool,
 ) -> "tuple[list[CheckResult], list[str]]":
     """Drive and evaluate all named tests, and print each result; return the results and the unused baselines."""
-    from antdrive.cli.testing.python_tests import drive_python_tests, is_module
-    from antdrive.cli.testing.unused import unused_beside
     from antdrive.runs.suites.suite import SUFFIX
+    from antdrive.testing.python_tests import drive_python_tests, is_module
+    from antdrive.testing.unused import unused_beside
     from antdrive.views.artefacts import Films, Results, default_folder
     from antdrive.views.run_folder import check_folder
 
@@ -89,7 +88,7 @@ def drive_tests(
     results = Results(folder or default_folder(Path.cwd()), cast("Films", film))
     outcomes, unused = drive_python_tests([w for w in words if is_module(w) or Path(w).is_dir()], only, update, results)
     for result in () if json else outcomes:
-        _print(result)
+        _print(result, set())
     suites = [word for word in words if not is_module(word)]
     if outcomes:
         suites = [word for word in suites if not Path(word).is_dir() or any(Path(word).rglob(f"*{SUFFIX}"))]
@@ -103,39 +102,41 @@ def drive_suites(
     suites: list[str], only: str | None, jobs: int | None, update: "Update", results: "Results", *, json: bool
 ) -> "list[CheckResult]":
     """Drive and evaluate the tests of suites with a progress bar, and print each result."""
-    from antdrive.cli.testing import check_cases
     from antdrive.runs.pool import cores
     from antdrive.runs.suites import scenario_of, select
+    from antdrive.testing import check_cases
 
     cases = select(suites, only)
     for case in cases:
-        if case.given.get("margin") == "auto":  # calibrate once, with a bar, before processes start
+        if case.written.settings.get("margin") == "auto":  # calibrate once, with a bar, before processes start
             with suppress(InputError, FieldError):  # reported as the test's failure
                 scenario_of(case, with_chosen_margin)
     processes = min(jobs or cores(), len(cases))
-    outcomes = []
+    outcomes, noted = [], set[str]()
     with bar("driving") as progress:
         for result in check_cases(cases, jobs=processes, update=update, results=results):
             outcomes.append(result)
             if not json:
-                _print(result)
+                _print(result, noted)
             progress(len(outcomes) / len(cases))
     return outcomes
 
 
-def _print(result: "CheckResult") -> None:
-    """Print the result of one test."""
+def _print(result: "CheckResult", noted: set[str]) -> None:
+    """Print the result of one test, without notes that were `noted` beside a test before."""
     words = (result.accepted or "passed") if result.passed else "FAILED"
     print_line(marked(result.passed, f"{result.address}: {words}"))
-    for line in (*result.gains, *result.notes) if result.passed else result.message.splitlines():
+    notes = [note for note in result.notes if note not in noted]
+    noted.update(notes)
+    for line in (*result.gains, *notes) if result.passed else result.message.splitlines():
         print_line(f"  {line}")
 
 
 def _summarise(results: "list[CheckResult]", json: bool, unused: Sequence[str], *, strict: bool = False) -> int:
     """Print the number of passed tests and the unused baselines. Return the exit code of the worst test."""
-    from antdrive.cli.testing.evaluation import INTERNAL_ERROR as INTERNAL
-    from antdrive.cli.testing.evaluation import INVALID_INPUT as WRONG
-    from antdrive.cli.testing.session_summary import films_omitted, unused_lines
+    from antdrive.testing.evaluation import INTERNAL_ERROR as INTERNAL
+    from antdrive.testing.evaluation import INVALID_INPUT as WRONG
+    from antdrive.testing.session_summary import films_omitted, unused_lines
 
     failed = [result for result in results if not result.passed]
     worst = {WRONG: INVALID_INPUT, INTERNAL: INTERNAL_ERROR}

@@ -2,8 +2,9 @@
 
 from typing import Annotated
 
+from antdrive.base.tables import table
 from antdrive.cli import options
-from antdrive.cli.console import show, table
+from antdrive.cli.console import show
 from antdrive.cli.options import flag
 
 

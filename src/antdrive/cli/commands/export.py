@@ -5,25 +5,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-from antdrive.base.errors import FieldError, InputError
+from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import flag, option
 from antdrive.cli.parse import log_at, pair
 
 
-def export_drive(
+def export(
     rollout: options.Log,
     out: Annotated[Path, option("PATH", "Output: .mcap file or new folder.")],
     to: Annotated[str, option("KIND", "Format: mcap, rosbag2 or csv.", "--to")] = "mcap",
     force: Annotated[bool, flag("Replace an existing .mcap file and layout.", "--force")] = False,
-    scans: Annotated[
-        bool,
-        flag(
-            "Simulate scans that the log lacks.",
-            "--scans/--no-scans",
-        ),
-    ] = True,
+    scans: Annotated[bool, flag("Simulate scans that the log lacks.", "--scans/--no-scans")] = True,
     urdf: Annotated[
         Path | None,
         option("FILE", "The robot's .urdf or .xacro, for description, frames and joints.  [default: generated]"),
@@ -40,7 +34,8 @@ def export_drive(
     """
     from antdrive.robots import RobotSpec
     from antdrive.robots.importing.model import checked_packages
-    from antdrive.views.export.exporting import EXPORTS, export
+    from antdrive.views.export.exporting import EXPORTS
+    from antdrive.views.export.exporting import export as write
     from antdrive.views.export.robot_frames import RobotFrames, frames_of_spec, frames_of_urdf
 
     if force and to in EXPORTS and to != "mcap":
@@ -60,9 +55,6 @@ def export_drive(
             arguments=dict(pair(word, "--arg") for word in arguments or ()),
             packages=checked_packages(dict(pair(word, "--package") for word in packages or ())),
         )
-    try:
-        files = export(log_at(rollout), to, out, replace=force, scans=scans, frames=frames)
-    except FieldError as error:
-        raise InputError(f"--{error.key}: {error.problem}") from None
+    files = write(log_at(rollout), to, out, replace=force, scans=scans, frames=frames)
     written = {("layout" if file.name.endswith(".foxglove.json") else to): str(file) for file in files}
     show(json, {"files": written}, file_lines(written))

@@ -75,20 +75,14 @@ def import_robot(
     left: Annotated[str | None, option("NAME", "Joint or link of the left driven wheel.")] = None,
     right: Annotated[str | None, option("NAME", "Joint or link of the right driven wheel.")] = None,
     below: Annotated[
-        float | None,
-        option(
-            "METRES",
-            "Omit collision geometry above this height from the footprint [m].",
-            min=0.0,
-        ),
+        float | None, option("METRES", "Omit collision geometry above this height from the footprint [m].", min=0.0)
     ] = None,
     footprint: Annotated[
         str, option("KIND", "disc, rectangle, polygon or auto (the first of these that fits).")
     ] = "auto",
     wheel_radius: Annotated[float | None, option("METRES", "Radius of the driven wheels [m].", min=0.0)] = None,
     given: Annotated[
-        list[str] | None,
-        option("KEY=VALUE", "Value of the robot file, such as mass=12. Repeatable.", "--set", "-s"),
+        list[str] | None, option("KEY=VALUE", "Value of the robot file, such as mass=12. Repeatable.", "--set", "-s")
     ] = None,
     meshes: Annotated[Path | None, option("FOLDER", "Folder of the meshes.")] = None,
     without_meshes: Annotated[bool, flag("Omit missing meshes.", "--without-meshes")] = False,

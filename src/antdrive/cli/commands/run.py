@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from antdrive.base.atomic import folder_lock
 from antdrive.base.errors import InputError
 from antdrive.cli import options
-from antdrive.cli.console import bar, planning, show, stage, this_command
+from antdrive.cli.console import bar, file_lines, marked, planning, show, stage, this_command
 from antdrive.cli.options import flag, option
-from antdrive.cli.output import film_drives, print_idle_settings, run_lines
+from antdrive.cli.output import film_drives, print_idle_settings
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.sim.settings import SETTINGS
 from antdrive.views.run_folder import check_film, check_folder, default_folder, naming_saved, write_result, write_run
@@ -39,6 +39,7 @@ def run(
     from antdrive.planners import keep_best
     from antdrive.sim.pipeline import plan
     from antdrive.sim.pipeline import run as drive
+    from antdrive.sim.summary import run_lines
 
     with stage("reading the scenario"):
         scenario = setup.scenario(ends.of(world), given)
@@ -57,7 +58,9 @@ def run(
             with naming_saved(report["files"].values()):
                 filmed = film_drives([result.rollout], film, prelude=prelude)["file"]
                 report = write_result(result, {**report["files"], "film": filmed}, this_command())
-    show(json, report, run_lines(result, report["files"]))
+    first, *rest = run_lines(result)
+    lines = [marked(result.succeeded, first), *rest, *file_lines(report["files"])]
+    show(json, report, lines)
     if gui and result.rollout is not None:
         from antdrive.views.window import show as show_window
 

@@ -1,13 +1,13 @@
 """`antdrive worlds`: list, show, generate, import and export."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from antdrive.base.errors import FieldError, InputError
+from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, summary_of
 from antdrive.cli import options
-from antdrive.cli.console import bar, file_lines, show, stage, table
+from antdrive.cli.console import bar, file_lines, show, stage
 from antdrive.cli.listings import Row, world_lines
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import import_target, numbers, pair
@@ -15,19 +15,8 @@ from antdrive.cli.scenario_options import Ends, random_world
 
 if TYPE_CHECKING:
     from antdrive.worlds import Task
-    from antdrive.worlds.coverage import Coverage
 
-MOST_DOORS = 12  # listed at most
-NAMES = {"disc": "coverage", "footprint": "coverage_by_footprint"}  # keys in JSON, by the shape of plans
 MANY = 5000  # cylinders; planning takes seconds beyond this
-UNITS = {
-    "frame": " m, m, rad",
-    "bounds": " m",
-    "start": " m, m, rad",
-    "goal": " m",
-    "goal_tolerance": " m",
-    "cell": " m",
-}
 
 
 def list_worlds(json: options.Json = False) -> None:
@@ -47,26 +36,10 @@ def _catalogue() -> dict[str, Any]:
     """Summarise the worlds of the catalogue."""
     from antdrive.worlds import list_worlds, load_task
 
-    return {name: {**_facts(load_task(name)), "about": summary_of(path)} for name, path in list_worlds().items()}
+    return {name: {**load_task(name).as_dict(), "about": summary_of(path)} for name, path in list_worlds().items()}
 
 
-def _facts(task: "Task") -> dict[str, Any]:
-    """Summarise a task as plain values."""
-    return {
-        "name": task.world.name,
-        "source": task.world.source,
-        "bounds": list(task.world.bounds),
-        "start": list(task.start),
-        "goal": list(task.goal),
-        "goal_tolerance": task.goal_tolerance,
-        "cell": task.cell,
-        **({"frame": list(task.frame)} if any(task.frame) else {}),
-        "obstacles": len(task.world.obstacles),
-        "movers": len(task.world.movers),
-    }
-
-
-@options.with_settings(("margin",))
+@options.with_settings(("noise", "margin"))
 def show_world(
     *,
     world: options.World,
@@ -74,105 +47,23 @@ def show_world(
     ends: Ends,
     out: Annotated[Path | None, option("FILE", "Drawing: .png, .svg or .pdf.")] = None,
     json: options.Json = False,
-    **settings: Any,
+    **given: Any,
 ) -> None:
     """Describe a world and check whether a robot can cross it."""
-    from antdrive.base.plane import format_numbers, world_to_map
-    from antdrive.planners import Query
-    from antdrive.robots import list_robots, load_robot, outline_of, overlap_at
-    from antdrive.robots.default_margin import LEAST
-    from antdrive.sim import Scenario, plan
-    from antdrive.sim.driving.routes import FINE
-    from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
-    from antdrive.worlds.coverage import coverage
+    from antdrive.sim import fit
+    from antdrive.worlds import load_tasks, task_to_dict
 
-    margin = LEAST if settings["margin"] is None else settings["margin"]
-    if margin == "auto":
+    if given["margin"] == "auto":
         raise InputError("--margin auto: applies to drives only; give a number of metres")
-    given, spec = ends.of(world), load_robot(robot)
-    shown = load_task(given) if isinstance(given, str) else given
-    known = {name: load_robot(name) for name in list_robots()}
-    starts = {each.name: overlap_at(shown.world, each, shown.start) for each in (*known.values(), spec)}
-    grids = {"disc": rasterise(shown.world, shown.cell, spec.radius + margin)}
-    if not spec.footprint.is_disc:
-        outline = outline_of(spec.footprint, margin)
-        grids["footprint"] = rasterise(shown.world, min(shown.cell, FINE), spec.radius + margin, outline)
-    overlap = starts[spec.name]
     with stage("planning with astar"):
-        planned, answer = (grids["disc"], None) if overlap else plan(Scenario.of(shown, "astar", spec, margin=margin))
-    passable, why = answer is not None and answer.solved, overlap if answer is None else answer.reason
-    entries = [tuple(grid.xy([Query.between(grid, shown).start])[0].tolist()) for grid in grids.values()]
-    covered = dict(zip(grids, coverage(shown.world, [*grids.values()], shown.start[:2], entries), strict=True))
+        found = fit(ends.task_of(world), robot, **given)
     if out is not None:
-        from antdrive.planners import PlanResult, PlanStatus
         from antdrive.views.figures.plan_figures import plan_figure
 
-        drawn = answer or PlanResult(status=PlanStatus.NO_PATH, reason=f"start: {spec.name} {overlap}")
-        plan_figure(shown, planned, drawn, spec, out, covered=list(covered.values()))
-    named = list(load_tasks(world))
-    facts = {
-        "passable": passable,
-        "reason": why,
-        "robot": spec.name,
-        "margin": margin,
-        "starts": starts,
-        "tasks": named,
-    }
-    facts |= {NAMES[shape]: _coverage_facts(each) for shape, each in covered.items()}
-    said = {key + UNITS.get(key, ""): _said(value) for key, value in _facts(shown).items()}
-    if any(shown.frame):
-        for key, pose in {"start": shown.start, "goal": shown.goal}.items():
-            said[f"{key} in its map"] = format_numbers(world_to_map(shown.frame, [pose])[0].round(4).tolist())
-    by = " by its footprint" if passable and planned.turns else ""
-    said["passable"] = f"{'yes' if passable else 'no'}, for {spec.name}{by} with a margin of {margin:g} m"
-    said |= {"reason": why} if why and not overlap else {}
-    said["start is free for"] = ", ".join(name for name, overlap in starts.items() if not overlap) or "-"
-    rows = [*said.items(), *_coverage_rows(covered, spec.footprint.inner_radius + margin)]
-    rows += [(f"start for {name}", overlap) for name, overlap in starts.items() if overlap]
-    rows += [("tasks", ", ".join(named))] if named else []
-    lines = [*table(rows[0], rows[1:]), *([] if out is None else file_lines({"figure": out}))]
-    show(json, {**task_to_dict(shown), **facts}, lines)
-
-
-def _said(value: Any) -> str:
-    """Format a fact for people."""
-    from antdrive.base.plane import format_number, format_numbers
-
-    if isinstance(value, list):
-        return format_numbers(value)
-    return "-" if value is None else format_number(value) if isinstance(value, float) else str(value)
-
-
-def _coverage_facts(covered: "Coverage") -> dict[str, Any]:
-    """Return a robot's share of the floor, rooms and doors as plain values."""
-    doors = [{"width": door.width, "at": list(door.at), "passed": door.passed} for door in covered.doors]
-    rooms = {"rooms": covered.room_count, "rooms_reached": len(covered.rooms_reached)}
-    return {"share": covered.share, **rooms, "doors": doors}
-
-
-def _coverage_rows(covered: "Mapping[str, Coverage]", least: float) -> "Iterator[tuple[str, str]]":
-    """Yield what a robot reaches by each shape, and the doors that its disc does not pass, those that just fail first.
-
-    Gaps narrower than `least` [m], such as those among chairs, are counted but are no doors.
-    """
-    from antdrive.base.plane import format_point
-
-    for shape, each in covered.items():
-        rooms = f"{len(each.rooms_reached)} of {each.room_count} rooms"
-        wide = [door.passed for door in each.doors if door.width >= least]
-        doors = f", {sum(wide)} of {len(wide)} doors" if wide else ""
-        reached = f"by its {shape}" if len(covered) > 1 else "reached"
-        yield reached, f"{each.share:.0%} of the connected floor, {rooms}{doors}"
-    last = list(covered.values())[-1].doors
-    shut = [door for first, door in zip(covered["disc"].doors, last, strict=True) if not first.passed]
-    listed = sorted((door for door in shut if door.width >= least), key=lambda door: (door.passed, -door.width))
-    for door in listed[:MOST_DOORS]:
-        place = f"{door.width:.2f} m wide at {format_point(door.at, 2)}"
-        yield "door by footprint" if door.passed else "door not passed", place
-    if len(listed) > MOST_DOORS:
-        yield "", f"and {len(listed) - MOST_DOORS} more"
-    if len(shut) > len(listed):
-        yield "no doors", f"{len(shut) - len(listed)} gaps narrower than {least:.2f} m, half of what the robot needs"
+        plan_figure(found.task, found.grid, found.plan, found.robot, out, covered=list(found.covered.values()))
+    tasks = load_tasks(world)
+    facts = {**task_to_dict(found.task), **found.as_dict(), "tasks": list(tasks)}
+    show(json, facts, [*found.lines(tasks), *([] if out is None else file_lines({"figure": out}))])
 
 
 @options.with_settings(("seed",))
@@ -256,34 +147,31 @@ def import_world(
     from antdrive.worlds.formats.map_server import OF_SHADE, kept_tasks
 
     skipped: list[str] = []
-    try:
-        file_format = import_format(path, barn=barn)
-        with bar("converting") as progress, conversion_progress(progress):
-            tasks = import_file(
-                path,
-                start=numbers("--start", start, 3, "X,Y,YAW"),
-                goal=numbers("--goal", goal, 2, "X,Y"),
-                bounds=numbers("--bounds", bounds, 4),
-                cell=given["cell"],
-                barn=barn,
-                band=numbers("--band", band, 2, "LOW,HIGH"),
-                skip_unsupported=skip_unsupported or None,
-                on_skipped=skipped.extend if skip_unsupported else None,
-                unknown=unknown,
-                overhang=overhang,
-                resolution=resolution,
-                problem=problem,
-                scen=scen,
-            )
-    except FieldError as error:
-        raise InputError(f"--{error.key.replace('_', '-')}: {error.problem}") from None
+    file_format = import_format(path, barn=barn)
+    with bar("converting") as progress, conversion_progress(progress):
+        tasks = import_file(
+            path,
+            start=numbers("--start", start, 3, "X,Y,YAW"),
+            goal=numbers("--goal", goal, 2, "X,Y"),
+            bounds=numbers("--bounds", bounds, 4),
+            barn=barn,
+            band=numbers("--band", band, 2, "LOW,HIGH"),
+            skip_unsupported=skip_unsupported or None,
+            on_skipped=skipped.extend if skip_unsupported else None,
+            unknown=unknown,
+            overhang=overhang,
+            resolution=resolution,
+            problem=problem,
+            scen=scen,
+            **given,
+        )
     is_set = file_format is IMPORTS["dynabarn"]
     usual = Path(f"{path.stem}.yaml")
     files = _targets(path, out or Path(path.stem), tasks) if is_set else [import_target(path, out, usual, "world")]
     for task, file in zip(tasks, files, strict=True):
         # A map written by antdrive holds the other tasks in its file.
         save_task(task, file, kept_tasks(path, task) if file_format is IMPORTS["map_server"] else {})
-    imported = [{**_facts(task), "files": {"world": str(file)}} for task, file in zip(tasks, files, strict=True)]
+    imported = [{**task.as_dict(), "files": {"world": str(file)}} for task, file in zip(tasks, files, strict=True)]
     lines = []
     if len(tasks) == 1:
         world = tasks[0].world

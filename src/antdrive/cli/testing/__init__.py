@@ -1,6 +1,1 @@
-"""The pytest plugin: suites, the fixture `drive`, and their reports."""
-
-import lazy_loader
-
-# Public names and their types are listed in __init__.pyi; each is imported on first use.
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+"""Former name of the pytest plugin, which earlier installations load; it leaves once they are renewed."""

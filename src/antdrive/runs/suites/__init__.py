@@ -1,4 +1,4 @@
-"""Regression tests of drives: suites of scenarios, their baselines, and a pytest plugin."""
+"""Regression tests of drives: suites of scenarios and their baselines."""
 
 import lazy_loader
 

@@ -1,0 +1,334 @@
+"""Evaluation of drives against tests and baselines, for the pytest plugin and `antdrive check`."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import os
+import shlex
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+from antdrive.base.errors import FieldError, InputError
+from antdrive.planners import PlannerError
+from antdrive.runs.pool import Pool, WorkerDied, in_new_process
+from antdrive.runs.suites.baseline import Baseline, fixed_hashes
+from antdrive.runs.suites.demands import Demands
+from antdrive.runs.suites.evaluation import RAISED, Evaluation, changes, evaluate, explain, unmet_demands
+from antdrive.runs.suites.scenarios import run_command, scenario_of
+from antdrive.runs.suites.suite import SuiteCase, load_suite, shown_path
+from antdrive.sim.pipeline import Run
+from antdrive.sim.pipeline import run as drive
+from antdrive.sim.rerun import UNSTEADY, fingerprint, fingerprint_of, is_unsteady
+from antdrive.sim.scenario import Scenario
+from antdrive.views.artefacts import MOST_FILMS, Results, remove_artefacts, write_artefacts, write_traceback
+
+#: Baselines to write: none, only missing ones, or all.
+Update: TypeAlias = Literal["", "new", "all"]
+#: Outcomes of a test that could not be evaluated: invalid input or internal error.
+INVALID_INPUT, INTERNAL_ERROR = "wrong_input", "internal_error"
+_REPEATED: dict[type, bool] = {}  # whether a new process repeats a planner's plans, by its class
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckResult:
+    """Result of a test.
+
+    Attributes:
+        address: the test's name in commands
+        passed: whether the test passed
+        case: the test's name in its baseline; empty without a baseline
+        outcome: the run's outcome, such as succeeded
+        certified: whether the drive is certified collision-free
+        faults: reasons for failing, one sentence each
+        gains: improvements over the baseline, one sentence each
+        notes: what could not be compared, one sentence each
+        details: explanations of the faults, one sentence each
+        accepted: change to the baseline: written, renewed, unchanged, or empty
+        commands: commands that repeat the test
+        files: written files by name
+        unfilmed: whether the test failed and has no film because `MOST_FILMS` exist
+        metrics: the drive's finite metrics; empty if the robot did not drive
+        digest: `Rollout.drive_digest`; empty if the robot did not drive
+        wall_s: duration of the test [s]
+    """
+
+    address: str
+    passed: bool
+    outcome: str
+    certified: bool
+    case: str = ""
+    faults: tuple[str, ...] = ()
+    gains: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    details: tuple[str, ...] = ()
+    accepted: str = ""
+    commands: tuple[str, ...] = ()
+    files: dict[str, str] = field(default_factory=dict)
+    unfilmed: bool = False
+    metrics: dict[str, float] = field(default_factory=dict)
+    digest: str = ""
+    wall_s: float = 0.0
+
+    @property
+    def message(self) -> str:
+        """Faults, details, commands and files of a failed test, one per line."""
+        lines = [*self.faults, *self.notes, *self.details]
+        lines += [f"{'repeat:' if k == 0 else '       '} {command}" for k, command in enumerate(self.commands)]
+        lines += [f"{name}: {path}" for name, path in self.files.items()]
+        if self.unfilmed:
+            lines.append(f"film: omitted after {MOST_FILMS} films; make it with {self.commands[0]}")
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the result as plain values for JSON."""
+        return dataclasses.asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """Criteria for a drive, and the destination of its results."""
+
+    address: str  # the test's name in commands
+    name: str  # the test's name in its baseline
+    demands: Demands
+    baseline: Path | None  # file of the baseline; None: compare with none
+    commands: tuple[str, ...]  # commands that repeat the test
+    accept: str  # command that accepts the drive
+    update: Update = ""  # baselines to write
+    folder: Path | None = None  # for the test's logs, figures and films; None: write nothing
+    results: Results | None = None  # selection of what to write; None: nothing
+    again: Callable[[], str] | None = None  # returns `fingerprint` of the test's scenario in any process
+
+    def evaluate(self, run: Run) -> CheckResult:
+        """Evaluate a run."""
+        started, path, accepted = time.perf_counter(), self.baseline, ""
+        baseline = None if path is None or self.update == "all" else Baseline.own(path, self.name)
+        if path is not None and baseline is None:
+            evaluation, accepted = self._without_baseline(run, path)
+        else:
+            evaluation = evaluate(run, self.demands, baseline)
+        if accepted in ("written", "renewed") and self._is_unsteady(run):
+            evaluation = dataclasses.replace(evaluation, notes=(*evaluation.notes, UNSTEADY))
+        details = [] if evaluation.passed else [*explain(run, baseline, self._elsewhere)]
+        files, unfilmed = dict[str, str](), False
+        try:
+            files, unfilmed = self._written(run, evaluation, baseline)
+        except Exception as error:  # drawing an invalid plan can raise any exception
+            if evaluation.passed:
+                raise
+            message = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+            details.append(f"results: {message}")  # must not hide the faults
+        rollout, wall = run.rollout, run.plan.wall_s
+        return CheckResult(
+            address=self.address,
+            passed=evaluation.passed,
+            outcome=run.outcome.key,
+            certified=run.certificate is not None and run.certificate.certified,
+            case="" if path is None else self.name,
+            faults=evaluation.faults,
+            gains=evaluation.gains,
+            notes=evaluation.notes,
+            details=tuple(details),
+            accepted=accepted,
+            commands=self.commands,
+            files=files,
+            unfilmed=unfilmed,
+            metrics={} if rollout is None else {name: x for name, x in run.metrics.items() if not math.isnan(x)},
+            digest="" if rollout is None else rollout.drive_digest,
+            wall_s=wall + (rollout.record.times.drive_wall_s if rollout else 0.0) + time.perf_counter() - started,
+        )
+
+    def _elsewhere(self) -> str | None:
+        """Return the scenario's fingerprint of a new process; None if that is unknown."""
+        return None if self.again is None else in_new_process(self.again)
+
+    def _is_unsteady(self, run: Run) -> bool:
+        """Return whether the planner of an accepted drive does not repeat its plan."""
+        s, first = run.scenario, fingerprint_of(run.scenario, run.plan, run.rollout)
+        kind = type(s.planner)
+
+        def elsewhere() -> str:
+            if kind not in _REPEATED:  # a new process takes seconds: one for each planner
+                _REPEATED[kind] = self._elsewhere() in (None, first)
+            return first if _REPEATED[kind] else ""
+
+        return is_unsteady(s, first, elsewhere)
+
+    def raised(self, s: Scenario, error: PlannerError) -> CheckResult:
+        """Return the result of a test whose planner raised an error, with what has changed since the baseline."""
+        details: tuple[str, ...] = ()
+        with suppress(InputError):
+            if self.baseline is not None and (earlier := Baseline.own(self.baseline, self.name)) is not None:
+                details = tuple(changes(s, fixed_hashes(s), earlier))
+        return self.failed_early(RAISED, str(error), error, details)
+
+    def failed_early(
+        self, outcome: str, fault: str, error: BaseException, details: tuple[str, ...] = ()
+    ) -> CheckResult:
+        """Return the result of a test ended by an error, with a traceback file unless the input was invalid."""
+        files: dict[str, str] = {}
+        if self.folder is not None:
+            try:
+                if outcome == INVALID_INPUT:
+                    remove_artefacts(self.folder)
+                else:
+                    files = write_traceback(self.folder, error, self.commands)
+            except (InputError, OSError) as problem:
+                details = (*details, f"results: {problem}")
+        return CheckResult(
+            address=self.address,
+            passed=False,
+            outcome=outcome,
+            certified=False,
+            faults=(fault,),
+            details=details,
+            commands=self.commands,
+            files=files,
+        )
+
+    def _without_baseline(self, run: Run, path: Path) -> tuple[Evaluation, str]:
+        """Evaluate a run without a baseline. Write one if requested and the demands are met; return what was written."""
+        faults, accepted = list(unmet_demands(run, self.demands)), ""
+        if not self.update:
+            remedy = "" if faults else f"; accept this drive with {self.accept}"
+            faults.append(f"baseline: {shown_path(path)} is missing{remedy}")
+        elif faults:
+            faults.append("baseline: not accepted, because the drive misses the test's expectations")
+        else:
+            accepted = Baseline.of(run, self.name).renew(path)
+        return Evaluation(tuple(faults)), accepted
+
+    def _written(self, run: Run, evaluation: Evaluation, baseline: Baseline | None) -> tuple[dict[str, str], bool]:
+        """Write a test's files. Return them by name, and whether a film was omitted."""
+        if self.folder is None or self.results is None:
+            return {}, False
+        remove_artefacts(self.folder)
+        failed, drove, films = not evaluation.passed, run.rollout is not None, self.results.films
+        filmed = drove and self.results.should_film(failed=failed)
+        if not (failed or films == "always"):
+            return {}, False
+        files = write_artefacts(
+            run, self.folder, baseline, film=filmed, faults=evaluation.faults, commands=self.commands
+        )
+        return files, drove and films == "failed" and not filmed
+
+
+def _check_of(case: SuiteCase, update: Update, results: Results | None) -> Check:
+    """Return the check of a suite's test, with the command that runs only this test."""
+    # Commands must work in the working directory; pytest's test names are relative to its rootdir.
+    anywhere = results is not None and results.root.resolve() != Path.cwd().resolve()
+    address = f"{case.suite}::{case.id}" if anywhere else case.address
+    return Check(
+        address=case.address,
+        name=case.id,
+        demands=case.demands,
+        baseline=case.baseline_path if case.entry.baseline else None,
+        commands=(shlex.join(["antdrive", "check", address]),),
+        accept=shlex.join(["antdrive", "accept", address]),
+        update=update,
+        folder=results.of(case.suite, case.id) if results else None,
+        results=results,
+        again=functools.partial(_fingerprint_by_name, str(case.suite), case.id),
+    )
+
+
+def check_case(case: SuiteCase, *, update: Update = "", results: Results | None = None) -> CheckResult:
+    """Drive a suite's test and evaluate it.
+
+    Args:
+        case: the test
+        update: baselines to write
+        results: destination of logs, figures and films; None: write nothing
+
+    Raises:
+        InputError: the suite, a file that it names, or the baseline is wrong.
+    """
+    scenario, check = scenario_of(case), _check_of(case, update, results)
+    run_alone = run_command(case, anywhere=check.commands != (shlex.join(["antdrive", "check", case.address]),))
+    check = dataclasses.replace(check, commands=tuple(filter(None, (*check.commands, run_alone))))
+    try:
+        return check.evaluate(drive(scenario))
+    except PlannerError as error:
+        return check.raised(scenario, error)
+
+
+def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
+    """Return the result of a test; errors become failures, so that a broken test does not stop the others."""
+    raised: Exception
+    try:
+        return check_case(case, update=update, results=results)
+    except FieldError as error:
+        outcome, fault, raised = INVALID_INPUT, str(case.error(error.key, error.problem)), error
+    except InputError as error:
+        placed = (
+            case.error(error.key, error.problem) if error.key else error
+        )  # found in the run, such as a cell too small
+        outcome, fault, raised = INVALID_INPUT, str(placed), error
+    except Exception as error:  # user planners may raise anything
+        outcome, fault, raised = INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}", error
+    return _check_of(case, update, results).failed_early(outcome, fault, raised)
+
+
+def check_cases(
+    cases: Sequence[SuiteCase], *, jobs: int = 1, update: Update = "", results: Results | None = None
+) -> Iterator[CheckResult]:
+    """Drive and evaluate many tests. Yield the results in the order of the tests; they do not depend on `jobs`.
+
+    A test with an invalid suite, file or baseline fails with that error as its fault.
+
+    Args:
+        cases: the tests
+        jobs: number of processes
+        update: baselines to write
+        results: destination of logs, figures and films; None: write nothing
+    """
+    with tempfile.TemporaryDirectory(prefix="antdrive-films-") as places:
+        limited = results and dataclasses.replace(results, places=Path(places))
+        yield from _check_in_turn(cases, jobs, update, limited)
+
+
+def _check_in_turn(
+    cases: Sequence[SuiteCase], jobs: int, update: Update, results: Results | None
+) -> Iterator[CheckResult]:
+    if jobs == 1 or len(cases) == 1:
+        for case in cases:
+            yield _check_or_fail(case, update, results)
+        return
+    work = functools.partial(_check_by_name, str(Path.cwd()), update, results)
+    with Pool(jobs) as pool:
+        made = pool.in_order(work, [(str(case.suite), case.id) for case in cases])
+        for case, done in zip(cases, made, strict=True):
+            if done.fault:
+                yield _check_of(case, update, results).failed_early(RAISED, done.died, WorkerDied(done.died))
+            elif done.died:
+                fault = f"internal error: {done.died}"
+                yield _check_of(case, update, results).failed_early(INTERNAL_ERROR, fault, WorkerDied(done.died))
+            elif isinstance(done.value, str):  # the suite changed after loading
+                yield _check_of(case, update, results).failed_early(INVALID_INPUT, done.value, InputError(done.value))
+            else:
+                yield done.value
+
+
+def _fingerprint_by_name(suite: str, test: str) -> str:
+    """Return the fingerprint of a test's scenario."""
+    return fingerprint(next(scenario_of(case) for case in load_suite(suite) if case.id == test))
+
+
+def _check_by_name(folder: str, update: Update, results: Results | None, name: tuple[str, str]) -> CheckResult | str:
+    """Return the result of a test named by another process, or an error message if the test was removed."""
+    os.chdir(folder)
+    suite, test = name
+    try:
+        case = next((case for case in load_suite(suite) if case.id == test), None)
+    except InputError as error:
+        return str(error)
+    if case is None:
+        return f"{suite}: test {test} was removed during the run"
+    return _check_or_fail(case, update, results)

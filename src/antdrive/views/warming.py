@@ -1,0 +1,126 @@
+"""Ahead-of-time compilation of every kernel into the cache of `antdrive.base.kernel_cache`.
+
+Commands compile a kernel once its calls have taken long in Python.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from antdrive.base import kernel_cache
+from antdrive.base.errors import InputError
+from antdrive.base.version import has_physics, versions
+
+if TYPE_CHECKING:
+    from antdrive.sim.log.rollout import Rollout
+    from antdrive.sim.pipeline import Run
+    from antdrive.sim.scenario import Scenario
+
+
+def is_warm() -> bool:
+    """Return whether the cache is complete for these sources, Python, packages and processor."""
+    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0") or _marker().exists()
+
+
+def warm(jobs: int | None = None, progress: Callable[[float], None] | None = None) -> None:
+    """Compile every kernel into the cache: plan with every planner; with PyBullet, drive and film, too.
+
+    Args:
+        jobs: number of processes; None: one per core
+        progress: called with the completed fraction
+
+    Raises:
+        InputError: no cache folder can be written.
+    """
+    from antdrive.planners import PLANNERS
+    from antdrive.runs.pool import Pool, cores
+
+    marker = _marker()
+    works = [*([None] if has_physics() else []), *PLANNERS]
+    with Pool(jobs or cores()) as pool:
+        for done, _ in enumerate(pool.results(_compile, works, in_order=False), 1):
+            if progress is not None:
+                progress(done / len(works))
+    marker.parent.mkdir(parents=True, exist_ok=True)
+    marker.touch()
+
+
+def _compile(planner: str | None) -> None:
+    """Plan with a planner; None: drive and film."""
+    with kernel_cache.compiled():
+        drive_and_film() if planner is None else plan_with(planner)
+
+
+def plan_with(name: str) -> None:
+    """Plan with a planner in a tiny world, for a disc and for a footprint."""
+    from antdrive.planners import capabilities_of
+    from antdrive.sim.pipeline import plan
+
+    one = _scenario(name)
+    plan(one)
+    if capabilities_of(one.planner).turns:
+        task = one.task if one.plans_footprints else replace(one.task, world=replace(one.task.world, movers=()))
+        plan(_oblong(replace(one, task=task)))
+
+
+def drive_and_film() -> None:
+    """Drive in a tiny world, with and without a map, and film the drives."""
+    from antdrive.sim.pipeline import run
+    from antdrive.views.film.video import film
+    from antdrive.worlds import Cruising
+
+    task = _scenario().task
+    comes = Cruising(radius=0.2, position=(2.5, 0.75), velocity=(-2.0, 0.0))  # forces an evasive manoeuvre
+    run(replace(_scenario(), task=replace(task, world=replace(task.world, movers=(comes,)))))
+    run(_oblong(_scenario()))  # the controller's kernel for lines
+    run(replace(_scenario(), map="none", localisation="matching"))
+    log, ants = _log(run(_scenario())), _log(run(_scenario("as")))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "warm.mp4"
+        film(log, path, size=(160, 160), fps=2)
+        film(log, path, size=(160, 160), fps=2, camera="follow")
+        film(ants, path, size=(160, 160), fps=2, prelude=1.0)
+
+
+def _log(run: Run) -> Rollout:
+    assert run.rollout is not None
+    return run.rollout
+
+
+def _scenario(planner: str = "astar") -> Scenario:
+    """Return a scenario in a tiny world, which takes little time beyond compiling."""
+    from antdrive.sim.scenario import Scenario
+    from antdrive.worlds import Cruising, Disc, Task, World
+
+    mover = Cruising(radius=0.1, position=(0.2, 2.8), velocity=(0.1, 0.0))
+    world = World("warm", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.2),), movers=(mover,))
+    return Scenario.of(Task(world, (0.75, 0.75, 0.0), (2.25, 2.25), cell=0.25), planner)
+
+
+def _oblong(scenario: Scenario) -> Scenario:
+    """Return a scenario with a robot whose plans keep its footprint clear."""
+    from antdrive.robots import Footprint
+
+    oblong = replace(scenario.robot, footprint=Footprint(half_length=0.2, half_width=0.15))
+    return replace(scenario, robot=oblong, footprint="exact")
+
+
+def _marker() -> Path:
+    """Return the file that marks a complete cache."""
+    folder = kernel_cache.cache_folder()
+    if folder is None:
+        raise InputError("warm: no writable cache folder; name one in NUMBA_CACHE_DIR")
+    facts = (
+        *versions().values(),
+        kernel_cache.sources_stamp(),
+        platform.machine(),
+        os.environ.get("NUMBA_CPU_NAME", ""),
+    )
+    return folder / f"antdrive-warm-{hashlib.sha256('|'.join(facts).encode()).hexdigest()[:16]}"
