@@ -387,7 +387,7 @@ def test_a_replanner_or_agent_of_the_wrong_kind_is_named_with_what_it_lacks(meth
 
 def test_a_grid_planner_whose_search_returns_nothing_is_named():
     class Empty(GridPlanner):
-        def _plan(self, query, rng):
+        def search(self, query, rng):
             return None
 
     with pytest.raises(

@@ -114,7 +114,7 @@ class Counting(GridPlanner):
 
     asked: list[Query] = []  # noqa: RUF012 - shared on purpose
 
-    def _plan(self, query, rng):
+    def search(self, query, rng):
         self.asked.append(query)
         return PLANNERS["astar"].plan(query, rng)
 
@@ -145,7 +145,7 @@ def test_a_planner_that_fails_to_warm_up_fails_again_when_timed():
     class Failing(GridPlanner):
         """A planner that always fails."""
 
-        def _plan(self, query, rng):
+        def search(self, query, rng):
             raise ArithmeticError(query.grid.shape)
 
     query = replace(tiny_query(Query, motions=False, task=True), start=(0, 0))

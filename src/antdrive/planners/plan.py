@@ -383,7 +383,7 @@ class GridPlanner(abc.ABC):
             started = time.perf_counter()
             result: Any = self._answer(query, rng)
             spent = time.perf_counter() - started
-        if not isinstance(result, PlanResult):  # a user's `_plan`; `request_plan` refuses it
+        if not isinstance(result, PlanResult):  # a user's `search`; `request_plan` refuses it
             return cast(PlanResult, result)
         options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return dataclasses.replace(result, options=options, wall_s=spent)
@@ -394,10 +394,10 @@ class GridPlanner(abc.ABC):
 
     def _answer(self, query: Query, rng: np.random.Generator) -> PlanResult:
         blocked = query.blocked_end
-        return PlanResult(status=PlanStatus.NO_PATH, reason=blocked) if blocked else self._plan(query, rng)
+        return PlanResult(status=PlanStatus.NO_PATH, reason=blocked) if blocked else self.search(query, rng)
 
     @abc.abstractmethod
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
         """Find a path between two free cells."""
 
 

@@ -264,7 +264,7 @@ def _instance(made: Any, who: str, source: str = "") -> Planner:
         if not isinstance(planner, Planner) or not callable(planner.plan):
             raise _unfit(
                 f"{who} is not a planner{source}: it has no method plan(query, rng); write one, "
-                "or inherit antdrive.planners.GridPlanner and write _plan(query, rng)"
+                "or inherit antdrive.planners.GridPlanner and write search(query, rng)"
             )
         if wrong := _mismatch(planner.plan, None, None):
             raise _unfit(f"{who} is not a planner{source}: its method must be plan(query, rng) ({wrong})")

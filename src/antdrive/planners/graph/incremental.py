@@ -291,7 +291,8 @@ class IncrementalPlanner(GridPlanner):
     def replanner(self, query: Query, rng: np.random.Generator) -> IncrementalSearch:
         """Return a search that can be repaired after its first plan; it does not use `rng`."""
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Search the grid once, without repairs."""
         return self.replanner(query, rng).result()
 
 
