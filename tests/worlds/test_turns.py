@@ -13,9 +13,9 @@ from antdrive.planners import (
     Query,
     agent_for,
     capabilities_of,
-    check_plan,
     load_planner,
     replanner_for,
+    validate_plan,
 )
 from antdrive.worlds import DIRECTIONS, Disc, Task, World, rasterise
 from antdrive.worlds.headings import Outline, sweep_clearance
@@ -101,7 +101,7 @@ def test_the_ends_of_a_task_lead_to_its_path(seed, yaw):
     task = Task(world, (0.8, 0.8, yaw), (3.2, 3.2), goal_tolerance=0.2)
     query = Query.between(rasterise(world, 0.1, 0.6, LONG), task)
     plan = load_planner("astar").plan(query, np.random.default_rng(0))
-    assert check_plan(query, plan) == ""
+    assert validate_plan(query, plan) == ""
     if plan.solved:
         assert math.dist(query.grid.xy(plan.cells[-1:])[0], task.goal) <= task.goal_tolerance
     else:
@@ -119,7 +119,7 @@ def test_a_turn_that_is_not_free_is_no_plan():
     plan = load_planner("astar").plan(Query(grid, (row, 10), (row, 12), start_label=start), np.random.default_rng(0))
     assert plan.cost == pytest.approx(0.2)
     back = type(plan)(status=PlanStatus.SOLVED, cells=cells, cost=0.3)
-    problem = check_plan(Query(grid, (row, 10), (row, 11), start_label=start), back)
+    problem = validate_plan(Query(grid, (row, 10), (row, 11), start_label=start), back)
     assert problem == f"cells: step 2 from ({row}, 12) to ({row}, 11) is no allowed move"
 
 
