@@ -141,7 +141,8 @@ class IterativePlanner(GridPlanner):
     def work_unit(self) -> str:
         """The unit of `work`."""
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Iterate within the options' limits."""
         return self.answer(query, self.iterate(query, rng))
 
     def answer(self, query: Query, states: Iterator[Iteration]) -> PlanResult:

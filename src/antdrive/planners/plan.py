@@ -382,7 +382,7 @@ class GridPlanner(abc.ABC):
             spent = clock()
             result: Any = self.untimed(query, rng)
             wall_s = spent()
-        if not isinstance(result, PlanResult):  # a user's `_plan`; `request_plan` refuses it
+        if not isinstance(result, PlanResult):  # a user's `search`; `request_plan` refuses it
             return cast(PlanResult, result)
         options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return dataclasses.replace(result, options=options, wall_s=wall_s)
@@ -390,10 +390,10 @@ class GridPlanner(abc.ABC):
     def untimed(self, query: Query, rng: np.random.Generator) -> PlanResult:
         """Find a path, without its planning time and options: Python runs kernels that take little time."""
         blocked = query.blocked_end
-        return PlanResult(status=PlanStatus.NO_PATH, reason=blocked) if blocked else self._plan(query, rng)
+        return PlanResult(status=PlanStatus.NO_PATH, reason=blocked) if blocked else self.search(query, rng)
 
     @abc.abstractmethod
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
         """Find a path between two free cells."""
 
 

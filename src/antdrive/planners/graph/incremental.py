@@ -265,7 +265,7 @@ class IncrementalSearch(CachedReplanner):
     def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
         if len(self._graph.mask) > len(self._arrays[0]):  # with turns, cells got more labels
             room = len(self._graph.mask) * 5 // 4
-            self._arrays = [extended(*one, room) for one in zip(self._arrays, self._initial, strict=True)]
+            self._arrays = [extended(*pair, room) for pair in zip(self._arrays, self._initial, strict=True)]
         nodes, start = self._nodes(changed), query.start_node
         cells, diagonal, work = self._kernels.repair(nodes, self._graph, start, self._goal, self._state, *self._arrays)
         if not len(cells):
@@ -292,7 +292,8 @@ class IncrementalPlanner(GridPlanner):
     def replanner(self, query: Query, rng: np.random.Generator) -> IncrementalSearch:
         """Return a search that can be repaired after its first plan; it does not use `rng`."""
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Search the grid once, without repairs."""
         return self.replanner(query, rng).result()
 
 

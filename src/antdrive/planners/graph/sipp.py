@@ -61,7 +61,8 @@ class SafeIntervals(GridPlanner):
 
     capabilities: ClassVar[Capabilities] = Capabilities(needs_motions=True, deterministic=True, turns=True)
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Find the earliest arrival among the motions of the query."""
         return plan_in_time(
             query,
             query.motions,

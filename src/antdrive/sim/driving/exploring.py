@@ -124,7 +124,7 @@ class Exploration(RouteGuide):
         """Check an external plan on the grid of `first`, which has the obstacles of the first scan."""
         if not plan.solved:
             return grid, plan
-        return grid, self._routes.checked(Query.between(grid, self._known(self._task.start, bounds_of(grid))), plan)
+        return grid, self._routes.validated(Query.between(grid, self._known(self._task.start, bounds_of(grid))), plan)
 
     # ---- plans
 
