@@ -10,7 +10,7 @@ from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.version import require_physics
 from antdrive.cli.console import bar, print_error
 from antdrive.cli.options import Planner, Robot, option
-from antdrive.cli.parse import numbers, pair
+from antdrive.cli.parse import numbers, pair, pose
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -33,7 +33,7 @@ class Ends:
         str | None,
         option(
             "X,Y,YAW",
-            "Start pose [m, m, rad].  [default: the task's]",
+            "Start pose [m, m, rad or 90deg].  [default: the task's]",
             panel="World",
         ),
     ] = None
@@ -59,7 +59,7 @@ class Ends:
         from antdrive.base.plane import map_to_world
         from antdrive.worlds import load_task
 
-        ends = {"start": numbers("--start", self.start, 3, "X,Y,YAW"), "goal": numbers("--goal", self.goal, 2, "X,Y")}
+        ends = {"start": pose("--start", self.start), "goal": numbers("--goal", self.goal, 2, "X,Y")}
         given: dict[str, Any] = {key: value for key, value in ends.items() if value is not None}
         task = load_task(world, self.task)
         try:
