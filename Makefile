@@ -56,14 +56,14 @@ test: $(VENV)/.dev $(VENV)/.warm
 test-slow: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m tools.loop $(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m slow
 
-# What pages show runs again when they or the packages change. Both halves use a process for each core, four at most.
+# A page runs again when it or the packages change. Both halves use a process for each core, four at most.
 DEPTHS := * */* */*/* */*/*/*
 SOURCES := $(foreach folder,src/antdrive,$(wildcard $(foreach depth,$(DEPTHS),$(folder)/$(depth).py $(folder)/$(depth).yaml)))
 # `make docs JOBS=1` uses fewer.
 JOBS ?= $(shell cores=$$(nproc 2>/dev/null || echo 2); [ "$$cores" -le 4 ] && echo "$$cores" || echo 4)
 
 docs/_build/.pages: $(VENV)/.docs $(VENV)/.warm $(SOURCES) tools/pages.py $(wildcard docs/*.md docs/*/*.md docs/*/*/*.md examples/*/*.md)
-	@$(BIN)/python -m tools.pages --all --jobs $(JOBS) --kept docs/_build/pages.json
+	@$(BIN)/python -m tools.pages --jobs $(JOBS) $(if $(filter-out %.md,$?),,$?)
 	@mkdir -p docs/_build && touch $@
 
 docs/_build/.gallery: $(VENV)/.docs $(VENV)/.warm $(SOURCES)

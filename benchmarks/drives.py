@@ -10,6 +10,7 @@ Tables:
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 import statistics
@@ -59,6 +60,12 @@ class Result(NamedTuple):
     metrics: dict[str, float]
     optimum: float
     errors: dict[float, list[float]]
+
+
+def with_lidar(name: str) -> RobotSpec:
+    """Load a robot of the catalogue; one without a lidar gets the jackal's."""
+    spec = load_robot(name)
+    return spec if spec.lidar is not None else dataclasses.replace(spec, lidar=load_robot("jackal").lidar)
 
 
 def drive(name: str, task: Any, planner: str, robot: str | RobotSpec, **settings: Any) -> Result:

@@ -43,7 +43,7 @@ from antdrive.worlds import (
     load_task,
     rasterise,
 )
-from benchmarks.kinds import with_lidar
+from benchmarks.drives import with_lidar
 from benchmarks.markdown import command_line, missing, print_tables, table
 from tools.shared_data import DYNABARN
 

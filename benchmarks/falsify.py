@@ -27,8 +27,7 @@ from antdrive.runs.failures.hunt import METHODS, Finding, Hunt, find_failures
 from antdrive.runs.pool import Pool
 from antdrive.sim import Scenario, run
 from antdrive.worlds.passage import feasible
-from benchmarks.markdown import chosen, command_line, print_tables, table
-from benchmarks.resuming import append_line, current_commit, read_lines
+from benchmarks.markdown import append_line, chosen, command_line, current_commit, print_tables, read_lines, table
 
 SMALLEST = ("--seeds 1 --budget 2 --worlds 2",)
 CARELESS: dict[str, Any] = {"margin": 0.0, "noise": 1.0, "smoothing": "none"}

@@ -41,8 +41,7 @@ from antdrive.sim.scenario import LossFactors, Scenario
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 from antdrive.worlds.headings import Outline, turn_clear
 from antdrive.worlds.world import PointWorld, by_geometry
-from benchmarks.drives import Result, barn_tasks, drive
-from benchmarks.kinds import with_lidar
+from benchmarks.drives import Result, barn_tasks, drive, with_lidar
 from benchmarks.lattice import Flood, Point, Shape, flood
 from benchmarks.markdown import command_line, print_tables, table
 from tools.shared_data import BARN

@@ -1,4 +1,4 @@
-"""Command-line options and Markdown tables shared by benchmarks.
+"""Command-line options, files of results and Markdown tables shared by benchmarks and audits.
 
 Each benchmark lists the arguments of its smallest calls in `SMALLEST`. `tests/benchmarks` makes these calls.
 """
@@ -6,8 +6,11 @@ Each benchmark lists the arguments of its smallest calls in `SMALLEST`. `tests/b
 from __future__ import annotations
 
 import argparse
+import json
+import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 MISSING = 77  # the exit code where data or packages are missing; test drivers take it for a skip
@@ -37,6 +40,41 @@ def missing(what: str) -> NoReturn:
     """End because data or packages are missing."""
     print(what, file=sys.stderr)
     sys.exit(MISSING)
+
+
+def read_lines(path: Path | None) -> list[dict[str, Any]]:
+    """Return the objects of a file, ignoring a truncated last line; none without a file.
+
+    Args:
+        path: the file; None: there is none
+    """
+    if path is None or not path.exists():
+        return []
+    text = path.read_text(encoding="utf-8")
+    whole, _, cut = text.rpartition("\n")
+    if cut:  # the process was killed while it wrote
+        path.write_text(whole + "\n" if whole else "", encoding="utf-8")
+    return [json.loads(line) for line in whole.splitlines()]
+
+
+def append_line(path: Path | None, value: Mapping[str, Any]) -> None:
+    """Append an object to a file.
+
+    Args:
+        path: the file; None: nothing is written
+        value: the object
+    """
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(value) + "\n")
+
+
+def current_commit() -> str:
+    """Return antdrive's commit; empty without one."""
+    command = ["git", "rev-parse", "--short", "HEAD"]
+    done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
+    return done.stdout.strip()
 
 
 def table(heads: str | Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:

@@ -12,7 +12,7 @@ from antdrive.robots import list_robots
 from antdrive.sim import Scenario, certify, run
 from antdrive.worlds import Cruising, Keyframed, Task, Trajectories, World
 from antdrive.worlds.files.world_file import task_to_dict
-from benchmarks.held_out import (
+from tests.audit.held_out import (
     KINDS,
     SETTINGS,
     case,
@@ -21,10 +21,9 @@ from benchmarks.held_out import (
     default_case,
     drive,
     failures,
-    results_of,
     scenario,
 )  # fmt: skip
-from benchmarks.second_audit import Least, least_clearance, track
+from tests.audit.second_audit import Least, least_clearance, track
 
 GOOD = {
     "n": 7, "seed": 1, "margins": "fixed", "kind": "barn", "robot": "jackal", "noise": 1.0, "smoothing": "taut",
@@ -101,13 +100,6 @@ def test_each_drive_counts_where_it_belongs(change, heading):
     listed = list(failures([result]))
     assert len(listed) == (heading not in ("certified", "no plan"))
     assert all("--seed 1 --margins fixed --only 7" in line for line in listed)
-
-
-def test_a_line_that_was_cut_off_is_driven_again(tmp_path):
-    path = tmp_path / "results.jsonl"
-    path.write_text('{"n": 0}\n{"n": 1}\n{"n": 2, "ou')
-    assert [r["n"] for r in results_of(path)] == [0, 1]
-    assert results_of(tmp_path / "none.jsonl") == []
 
 
 DISC, BOX = {"radius": 0.18}, {"length": 0.508, "width": 0.43}

@@ -287,7 +287,7 @@ def test_where_nothing_can_be_fetched_it_says_how_to_get_a_python(tmp_path, pip,
 
 @pytest.mark.parametrize(
     ("fits", "last"),
-    [(True, "make docs"), (False, ".venv/bin/python -m tools.pages --all --jobs 2")],
+    [(True, "make docs"), (False, ".venv/bin/python -m tools.pages --jobs 2")],
     ids=["3.11", "3.10"],
 )
 def test_integration_builds_the_site_where_python_is_new_enough_and_tests_another_python(tmp_path, fits, last):

@@ -30,12 +30,12 @@ from antdrive.views.film.film_options import FilmOptions
 from antdrive.views.film.prelude import planning_frames
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.video import STILLS, film, still
-from antdrive.views.pages.run_report import write_report
+from antdrive.views.pages.report import write_report
 from antdrive.worlds import list_worlds, load_task
 from antdrive.worlds.generators.generate import generated
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Disc, Task
-from tools.pages import Page
+from tools.pages import run_page
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 TUTORIALS = PICTURES.parent / "tutorials"
@@ -164,7 +164,7 @@ def lesson(page: str) -> Mapping[str, Rollout]:
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:
-            Page(TUTORIALS / f"{page}.md").run()
+            run_page(TUTORIALS / f"{page}.md")
             logs = sorted(Path().rglob("rollout.npz"))
             return {log.parent.relative_to("out").as_posix(): Rollout.load(log) for log in logs}
         finally:

@@ -36,7 +36,7 @@ from .sim.pipeline import run as run
 from .sim.scenario import Scenario as Scenario
 from .views.figures.run_figures import overview as overview
 from .views.film.video import film as film
-from .views.pages.run_report import write_report as write_report
+from .views.pages.report import write_report as write_report
 from .worlds.files.world_file import list_worlds as list_worlds
 from .worlds.files.world_file import load_task as load_task
 from .worlds.files.world_file import save_task as save_task

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.base import FieldError, InputError, arc_lengths, polyline_length, wrap_angle
-from antdrive.base.errors import input_error, require_finite, require_positive
+from antdrive.base.errors import input_error, require
 from antdrive.base.files import format_size
 from antdrive.base.optional import optional
 from antdrive.base.plane import format_disc, format_numbers, format_point, format_position, segment_lengths, tidy
@@ -52,15 +52,15 @@ def test_records_report_the_field():
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
 def test_positive_numbers_are_finite_and_above_0(value):
     with pytest.raises(FieldError, match=r"^size: must be greater than 0"):
-        require_positive("size", value)
-    require_positive("size", 1e-300)
+        require("size", value, above=0)
+    require("size", 1e-300, above=0)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_infinity_and_nan_are_not_finite(value):
     with pytest.raises(FieldError, match=r"^size: must be a finite number"):
-        require_finite("size", value)
-    require_finite("size", -1e300)
+        require("size", value)
+    require("size", -1e300)
 
 
 def test_an_input_error_is_one_line_of_printable_characters():

@@ -1,4 +1,4 @@
-"""Every benchmark runs in its smallest size: `SMALLEST` of its module has the words of each call."""
+"""Every benchmark and every audit runs in its smallest size: `SMALLEST` of its module has the words of each call."""
 
 import ast
 import json
@@ -24,7 +24,11 @@ def smallest(path):
     return list(ast.literal_eval(values[0])) if values else []
 
 
-CALLS = {path.stem: smallest(path) for path in sorted((ROOT / "benchmarks").glob("*.py"))}
+CALLS = {
+    f"{room}.{path.stem}": smallest(path)
+    for room in ("benchmarks", "tests.audit")
+    for path in sorted((ROOT / room.replace(".", "/")).glob("*.py"))
+}
 
 
 def test_every_benchmark_has_a_smallest_size():
@@ -63,7 +67,7 @@ def copies():
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that begin as copies")
 @pytest.mark.parametrize(("name", "words"), [(name, words) for name, calls in CALLS.items() for words in calls or ()])
 def test_a_benchmark_runs_in_its_smallest_size(name, words, tmp_path, copies):
-    copies.stdin.write(json.dumps([str(tmp_path), f"benchmarks.{name}", *shlex.split(words)]) + "\n")
+    copies.stdin.write(json.dumps([str(tmp_path), name, *shlex.split(words)]) + "\n")
     copies.stdin.flush()
     code, said = int(copies.stdout.readline()), (tmp_path / "stderr").read_text()
     if code == MISSING:

@@ -8,7 +8,7 @@ import pytest
 from antdrive.planners import load_planner
 from antdrive.robots import load_robot
 from antdrive.sim import Rollout, Scenario, run
-from antdrive.sim.repeating import command_of
+from antdrive.sim.written import command_of
 from antdrive.worlds import Disc, load_task, save_task
 from tests.records import changed
 
@@ -22,7 +22,7 @@ def test_the_command_of_a_log_repeats_its_drive(antdrive, tmp_path, world):
     planner = load_planner("aco-han", ants="7", iterations="3")
     given = {"noise": 1.0, "seed": 3, "margin": 0.05, "smoothing": "none", "time_limit": 1.5}
     log = run(Scenario(task=task, planner=planner, planner_name="aco-han", robot=load_robot("jackal"), **given)).rollout
-    command = command_of(log)
+    command = command_of(log.record)
     assert command.startswith(
         f"antdrive run {'empty --goal=4.0,3.0' if world == 'empty' else 'own.yaml'} --planner aco-han"
     )
@@ -32,14 +32,15 @@ def test_the_command_of_a_log_repeats_its_drive(antdrive, tmp_path, world):
 
 def test_a_command_names_settings_that_differ_from_the_defaults_alone(small_run):
     log = small_run.rollout
-    assert command_of(log) == "antdrive run small.yaml --planner astar --robot turtlebot --margin 0.03 --seed 0"
-    odd = changed(
-        log, "record", planner=replace(log.record.planner, name="Own; rm"), controller=replace(log.record.controller)
+    assert command_of(log.record) == "antdrive run small.yaml --planner astar --robot turtlebot --seed 0"
+    old = replace(log.record, written=None)
+    assert command_of(old).startswith(
+        "antdrive run small.yaml --planner astar --robot turtlebot --margin 0.03 --cell 0.25"
     )
+    odd = replace(old, planner=replace(log.record.planner, name="Own; rm"))
     assert "--planner 'FILE.py:Own; rm'" in command_of(odd)
-    unknown = changed(log, "record", controller=replace(log.record.controller, settings={"speed": 1.0}))
-    assert command_of(unknown) is None
-    assert command_of(changed(log, "record", control_hz=120)) is None, "antdrive run has no option for it"
+    assert command_of(replace(old, controller=replace(log.record.controller, settings={"speed": 1.0}))) is None
+    assert command_of(replace(old, control_hz=120)) is None, "antdrive run has no option for it"
 
 
 def test_escape_codes_are_spelled_out_on_the_terminal(capsys):

@@ -70,17 +70,9 @@ def test_code_fits_80_columns_and_output_100():
     assert [line for page, block in shown + drawn for line in wide(page, block)] == []
 
 
-def code_of(text):
-    """The kind of each block of code in Markdown, fenced, indented or in a list, and the number of its first line."""
-    blocks = [token for token in MarkdownIt().parse(text) if token.type in ("fence", "code_block") and token.map]
-    return [(token.type, token.map[0] + 1) for token in blocks if token.map]
-
-
-def test_the_runner_finds_every_block_that_markdown_has():
-    for page in PAGES:
-        text = page.read_text()
-        found = [("fence", block.line - 1) for block in blocks_of(text) if block.language != "before"]
-        assert found == code_of(text), page
+def test_no_code_is_indented_instead_of_fenced():
+    indented = [page for page in PAGES for token in MarkdownIt().parse(page.read_text()) if token.type == "code_block"]
+    assert indented == []
 
 
 def test_only_these_blocks_are_neither_code_nor_what_code_printed():
@@ -97,7 +89,7 @@ def test_the_build_runs_all_pages_with_code_but_those_that_tests_run():
     built = {page.relative_to(ROOT).as_posix() for page in pages_with_code()}
     runnable = {page for page, block in BLOCKS if block.language in RUN and not block.marks}
     assert runnable <= built | set(TESTED)
-    assert "python -m tools.pages --all" in (ROOT / "Makefile").read_text()
+    assert "python -m tools.pages --jobs" in (ROOT / "Makefile").read_text()
 
 
 def test_the_tests_that_pages_name_exist():

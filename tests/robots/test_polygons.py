@@ -211,4 +211,4 @@ def test_the_inertia_is_that_of_a_fine_lattice_of_masses(foot):
     x, y = np.meshgrid(np.linspace(xmin, xmax, 60), np.linspace(ymin, ymax, 60))
     inside = [foot.depth(a, b) > 0 for a, b in zip(x.ravel(), y.ravel(), strict=True)]
     expected = 7.0 * (x**2 + y**2).ravel()[inside].mean()
-    assert yaw_inertia(robot) == pytest.approx(expected, rel=0.05)
+    assert yaw_inertia(robot.mass, robot.footprint) == pytest.approx(expected, rel=0.05)

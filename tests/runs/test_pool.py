@@ -17,7 +17,7 @@ from antdrive.runs import pool
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.running import finished_of
-from antdrive.runs.pool import CHUNK_SECONDS, LONGEST_CHUNK, Pool, Waiting, WorkerDied, call_all, processes_for
+from antdrive.runs.pool import CHUNK_SECONDS, LONGEST_CHUNK, Pool, Waiting, WorkerDied, call_now, processes_for
 from tests.runs.campaigns.works import Deadly, Endless, Listing
 from tests.runs.light_works import Unloadable, compiling, dies_once, fails, process, refuses
 
@@ -136,8 +136,9 @@ def test_an_item_without_a_result_is_named():
 def test_one_process_is_this_one_and_so_are_those_of_a_worker():
     assert processes_for(1) == 0
     assert processes_for(3) == 3
-    assert call_all([os.getpid], 1) == [os.getpid()]
-    assert call_all([partial(processes_for, 3)] * 2, 2) == [0, 0]
+    assert list(Pool(processes_for(1)).results(call_now, [os.getpid])) == [os.getpid()]
+    with Pool(2) as workers:
+        assert list(workers.results(processes_for, [3, 3])) == [0, 0]
 
 
 Run = tuple[str, int]  # the world, the seed

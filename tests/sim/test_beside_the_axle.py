@@ -17,7 +17,7 @@ from antdrive.sim.log.certificate import _between_steps, _clearances
 from antdrive.views.film.meshes import robot_parts
 from antdrive.views.scene import Scene, contact_point
 from antdrive.worlds import Cruising, Disc, Task, World, import_barn, task_to_dict
-from benchmarks.second_audit import least_clearance
+from tests.audit.second_audit import least_clearance
 from tests.records import COARSE, changed
 from tools.shared_data import BARN
 

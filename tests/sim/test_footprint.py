@@ -104,7 +104,7 @@ def test_a_result_names_the_cell_that_the_footprint_was_planned_on(driven):
     made = driven("jackal", 0.0)
     log, result = made.rollout, made.as_dict()
     assert (made.scenario.planning_cell, log.record.cell, result["cell_m"]) == (0.1, 0.05, 0.05)
-    assert list(false_claims(result, log, made.certificate, made.metrics, log.digest)) == []
+    assert list(false_claims(result, made.logged)) == []
 
 
 def test_a_route_that_ends_short_of_a_goal_with_room_for_the_disc_is_genuine():

@@ -170,7 +170,7 @@ def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted):
         (
             "spl",
             "null",
-            "a.drive.yaml::clear[[]0]: not compared: spl; missing or null in the baseline: renew it",
+            "a.drive.yaml::clear[[]0]: not compared: spl; the baseline has no value; antdrive accept adds it",
         ),
     ],
     ids=["better", "hidden"],
@@ -355,7 +355,7 @@ def test_junit_properties_and_the_summary_of_a_ci_run(accepted, monkeypatch):
 
 def test_a_planner_that_raises_fails_its_test_in_one_line(project):
     project.makepyfile(mine="class Mine:\n    def plan(self, query, rng):\n        raise RuntimeError('lost')\n")
-    text = SUITE.replace("clear: {}", "clear: {planner: {file: mine.py, name: Mine}, baseline: false}")
+    text = SUITE.replace("clear: {}", "clear: {planner: 'mine.py:Mine', baseline: false}")
     project.makefile(".drive.yaml", a=text)
     found = project.runpytest(*PLUGIN, "-k", "clear")
     found.stdout.fnmatch_lines(["*Mine*RuntimeError: lost*"])

@@ -5,9 +5,8 @@ from antdrive.views.export.exporting import export
 from antdrive.views.figures.run_figures import then_and_now
 from antdrive.views.film.comparison_film import compare_film
 from antdrive.views.film.video import film, still
-from antdrive.views.pages.campaign_report import write_campaign_report
 from antdrive.views.pages.campaign_summary import summarise
-from antdrive.views.pages.run_report import write_report
+from antdrive.views.pages.report import Report, write_report
 from tests.messages import check_messages
 from tests.records import changed
 from tests.runs.made_up_campaign import Skill, made_up_runs
@@ -59,7 +58,7 @@ def test_invalid_films_figures_exports_and_reports_are_rejected_in_one_line(made
         "campaigns": {
             "one planner": lambda: summarise(runs, title="t", strict=True),
             "no metric": lambda: summarise(runs, title="t", metrics=["speed"]),
-            "t.pdf": lambda: write_campaign_report(summarise(runs, title="t"), tmp_path, out / "t.pdf"),
+            "t.pdf": lambda: Report.of(summarise(runs, title="t"), tmp_path).write(out / "t.pdf"),
         },
     }
     check_messages(calls, data_regression, tmp_path)

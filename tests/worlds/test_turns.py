@@ -19,7 +19,8 @@ from antdrive.planners import (
     replanner_for,
 )
 from antdrive.worlds import DIRECTIONS, Disc, Task, World, rasterise
-from antdrive.worlds.headings import Outline, free_headings, sweep_clearance
+from antdrive.worlds.headings import Outline, sweep_clearance
+from tests.worlds.headings.intervals import free_headings
 
 LONG = Outline(np.array([(0.5, -0.2), (0.5, 0.2), (-0.3, 0.2), (-0.3, -0.2)]), 0.03)
 STEP = math.pi / 4

@@ -98,6 +98,14 @@ def schema_of(kind: Hashable) -> Mapping[str, Any]:
     return schema
 
 
+def file_schema(kind: Hashable, title: str) -> dict[str, Any]:
+    """Return the JSON Schema of files that hold a record, for editors; their `name` may be missing."""
+    schema = schema_of(kind)
+    required = [key for key in schema["required"] if key != "name"]
+    draft = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": draft, **schema, "required": required, "title": title}
+
+
 @functools.cache
 def _adapter(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind)

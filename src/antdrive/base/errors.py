@@ -7,7 +7,17 @@ from collections.abc import Iterable
 
 
 class InputError(ValueError):
-    """Invalid user input. The message is one line: where, what, and how to fix it."""
+    """Invalid user input. The message is one line: where, what, and how to fix it.
+
+    Attributes:
+        key: what a person wrote wrongly, such as "planner.ants"; empty if the message says where
+        problem: the message without a place, if there is a key
+    """
+
+    def __init__(self, message: str, key: str = "", problem: str = "") -> None:
+        super().__init__(message)
+        self.key = key
+        self.problem = problem or message
 
 
 class Terminated(SystemExit):
@@ -31,13 +41,13 @@ class FieldError(ValueError):
         return f"{self.key}: {self.problem}" if self.key else self.problem
 
     def under(self, parent: str) -> FieldError:
-        """Return the error with the key prefixed: "radius" under "robot" is "robot.radius".
-
-        Args:
-            parent: key of the record that contains the field
-        """
+        """Return the error with the key prefixed by that of its `parent`: "radius" under "robot" is "robot.radius"."""
         dot = "." if parent and self.key and not self.key.startswith("[") else ""
         return FieldError(f"{parent}{dot}{self.key}", self.problem)
+
+    def as_input(self) -> InputError:
+        """Return the error as one of a user's input, with the same key and message."""
+        return InputError(visible(str(self)), self.key, visible(self.problem))
 
 
 def input_error(*parts: str) -> InputError:
@@ -61,18 +71,6 @@ def few(items: Iterable[object], most: int = 4, between: str = ", ") -> str:
     return between.join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
-def require_positive(key: str, value: float) -> None:
-    """Raise FieldError unless a value is positive and finite."""
-    if not 0 < value < math.inf:
-        raise FieldError(key, f"must be greater than 0, got {value:g}")
-
-
-def require_finite(key: str, value: float) -> None:
-    """Raise FieldError unless a value is finite."""
-    if not math.isfinite(value):
-        raise FieldError(key, f"must be a finite number, got {value}")
-
-
 def require(
     key: str,
     value: float,
@@ -82,11 +80,11 @@ def require(
     at_most: float = math.inf,
     below: float = math.inf,
 ) -> None:
-    """Raise FieldError for a number outside its range."""
+    """Raise FieldError for a number outside its range, or not finite."""
     bounds = [
         f"{word} {bound:.12g}"
-        for word, bound in (("at least", at_least), ("above", above), ("at most", at_most), ("below", below))
+        for word, bound in (("at least", at_least), ("greater than", above), ("at most", at_most), ("less than", below))
         if math.isfinite(bound)
     ]
     if not (at_least <= value <= at_most and above < value < below):
-        raise FieldError(key, f"must be {' and '.join(bounds) or 'finite'}, got {value:g}")
+        raise FieldError(key, f"must be {' and '.join(bounds) or 'a finite number'}, got {value:g}")

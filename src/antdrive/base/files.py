@@ -36,11 +36,7 @@ def as_json(value: Any) -> str:
 
 
 def parse_json(text: str | bytes, **options: Any) -> Any:
-    """Parse JSON in which no object has a key twice: readers differ in which of the values they use.
-
-    Args:
-        text: the JSON text
-        **options: further arguments of `json.loads`
+    """Parse JSON, with options of `json.loads`, in which no object has a key twice: readers differ in which value they use.
 
     Raises:
         FieldError: a key is given twice.

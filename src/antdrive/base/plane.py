@@ -16,11 +16,7 @@ HUGE = 1e7  # larger coordinates are printed with an exponent [m]
 
 
 def wrap_angle(angle: Angle) -> Angle:
-    """Wrap an angle into [-pi, pi).
-
-    Args:
-        angle: an angle or an array of angles [rad]
-    """
+    """Wrap an angle, or an array of angles, into [-pi, pi) [rad]."""
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
@@ -32,20 +28,12 @@ def segment_lengths(xy: npt.ArrayLike) -> Floats:
 
 
 def arc_lengths(xy: npt.ArrayLike) -> Floats:
-    """Return the arc length at each point of a polyline, shape (N,), from 0.
-
-    Args:
-        xy: the polyline's points (N, 2)
-    """
+    """Return the arc length at each point of a polyline `xy` (N, 2), shape (N,), from 0."""
     return np.concatenate(([0.0], np.cumsum(segment_lengths(xy))))
 
 
 def polyline_length(xy: npt.ArrayLike) -> float:
-    """Return the length of a polyline, in the unit of its points.
-
-    Args:
-        xy: the polyline's points (N, 2)
-    """
+    """Return the length of a polyline `xy` (N, 2), in the unit of its points."""
     return float(segment_lengths(xy).sum())
 
 
@@ -81,12 +69,7 @@ def tidy(value: float) -> float:
 
 
 def format_number(value: float, decimals: int = 6) -> str:
-    """Format a number as a person writes it: rounded, without trailing zeros; with an exponent if it is huge.
-
-    Args:
-        value: the number
-        decimals: largest number of decimals
-    """
+    """Format a number as a person writes it: rounded, without trailing zeros; with an exponent if it is huge."""
     text = f"{round(float(value), decimals) + 0.0:.12g}"  # the sum has no negative zero
     return f"{value:.3g}" if "e+" in text else text
 

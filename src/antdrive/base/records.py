@@ -10,7 +10,7 @@ import inspect
 import math
 import re
 from collections.abc import Hashable, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar, cast, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from annotated_types import Interval
 
@@ -47,12 +47,9 @@ def ranges_of(kind: Hashable) -> Mapping[str, tuple[float, float]]:
     for name, hint in get_type_hints(cast(Any, kind), include_extras=True).items():
         for limits in getattr(hint, "__metadata__", ()):
             if isinstance(limits, Interval):
-                ranges[name] = (_number(limits.ge), _number(limits.le))
+                low, high = cast("tuple[Any, Any]", (limits.ge, limits.le))
+                ranges[name] = (float(low), float(high))
     return ranges
-
-
-def _number(limit: Any) -> float:
-    return float(limit)
 
 
 def derived(record: R, **changes: Any) -> R:
@@ -63,16 +60,25 @@ def derived(record: R, **changes: Any) -> R:
 
 
 def clamp_angle(record: Any, key: str, most: float) -> None:
-    """Set an angle that was rounded beyond its limit, such as 3.142 for pi, to the limit [rad].
-
-    Args:
-        record: the record, before its check
-        key: the field
-        most: its largest magnitude [rad]
-    """
+    """Set an angle that was rounded beyond its largest magnitude `most`, such as 3.142 for pi, to that limit [rad]."""
     value = getattr(record, key)
     if most < abs(value) <= most + ANGLE_ROUNDING:
         object.__setattr__(record, key, math.copysign(most, value))
+
+
+@functools.cache
+def _choices_of(kind: Hashable) -> Mapping[str, tuple[Any, ...]]:
+    """Return the choices of each field of a record whose type is a Literal."""
+    hints = get_type_hints(cast(Any, kind))
+    return {name: get_args(hint) for name, hint in hints.items() if get_origin(hint) is Literal}
+
+
+def require_choices(record: Any) -> None:
+    """Raise FieldError for the first field that is none of the choices of its type."""
+    for key, choices in _choices_of(cast(Hashable, type(record))).items():
+        value, words = getattr(record, key), [repr(choice) for choice in choices]
+        if value not in choices:
+            raise FieldError(key, f"must be {', '.join(words[:-1])} or {words[-1]}, got {value!r}")
 
 
 def require_ranges(record: Any) -> None:

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from antdrive.base.errors import InputError
-from antdrive.base.files import format_size
 from antdrive.base.tables import table
-from antdrive.cli.console import file_lines, show
+from antdrive.cli.console import show
 from antdrive.cli.options import option
 
 if TYPE_CHECKING:
@@ -113,7 +112,7 @@ def campaign_folders(words: Sequence[str], context: typer.Context, query: Campai
 
 def compare_campaigns(folders: Sequence[Path], planners: Sequence[str], query: CampaignQuery, json: bool) -> None:
     """Print each planner's success and the comparison of each pair."""
-    from antdrive.views.pages.campaign_report import summarise_campaign
+    from antdrive.views.pages.report import summarise_campaign
 
     summary = summarise_campaign(folders, planners=planners, strict=True, **query.arguments)
     show(json, summary.as_dict(), _tables(summary))
@@ -128,21 +127,3 @@ def _tables(summary: "CampaignSummary") -> Iterator[str]:
         yield ""
     yield from (*summary.sentences, *summary.notes)
     yield f"Medians are over the {summary.common} instances that every planner solved."
-
-
-def report_campaigns(
-    folders: Sequence[Path], out: Path | None, json: bool, query: CampaignQuery, figures: Path | None, **given: Any
-) -> None:
-    """Write the report of one or several campaigns."""
-    from antdrive.views.pages.campaign_report import report_campaign
-
-    files = report_campaign(folders, out, figures=figures, **given, **query.arguments)
-    size = sum(path.stat().st_size for path in files)
-    facts = {"file": str(files[0]), "files": [str(path) for path in files], "bytes": size}
-    reports = [path for path in files if path.suffix not in (".pdf", ".svg")]
-    names: dict[str, Path] = dict(zip(("report", "pairs"), reports, strict=False))
-    show(
-        json,
-        facts,
-        [format_size(size), *file_lines({**names, **({} if figures is None else {"figures": figures})})],
-    )

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.cli.scenario_options import GROUPS, grouped
 from antdrive.planners.user_code import label_names
-
-if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
 
 MAX_PLANNERS = 6
 
@@ -65,14 +60,3 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) 
         for label in labels if group in GROUPS else [group]:
             own[label].append(f"{group if group == 'controller' else 'planner'}.{name}={value}")
     return [Entrant(label, name, tuple(own[label])) for label, name in labels.items()]
-
-
-def repeat_command(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
-    """Return the `antdrive run` command that repeats a compared run."""
-    from antdrive.sim.forms import setting_words, written
-
-    given = written(lambda name: getattr(scenario, name))
-    given |= {"controller": {}, **({"margin": "auto"} if scenario.chosen else {})}
-    words = ["--planner", entrant.name, "--robot", robot, *(setting_words(given) or ())]
-    words += [word for text in entrant.settings for word in ("--set", text)]
-    return shlex.join(["antdrive", "run", world, *words, *ends])

@@ -1,6 +1,7 @@
 """Options that describe a scenario."""
 
 import dataclasses
+import functools
 import sys
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from antdrive.cli.parse import numbers, pair, pose
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
+    from antdrive.sim.written import Written
     from antdrive.worlds import Task
 
 FRAMES = WORLD_FRAME, MAP_FRAME = "world", "map"
@@ -50,33 +52,38 @@ class Ends:
         ),
     ] = WORLD_FRAME
 
-    def of(self, world: str) -> "str | Task":
-        """Return the task of a world with this start and goal, or the world's name if no option is given."""
+    def of(self, world: str) -> "Written":
+        """Return a world with this task, start and goal in words; those in the frame of a map move to the world's."""
+        from antdrive.sim.written import Written
+
         if self.frame not in FRAMES:
             raise InputError(f"--frame {self.frame}: unknown; choose from {', '.join(FRAMES)}")
-        if self.task is None and self.start is None and self.goal is None:
-            return world
-        from antdrive.base.plane import map_to_world
-        from antdrive.worlds import load_task
+        given = {"start": pose("--start", self.start), "goal": numbers("--goal", self.goal, 2, "X,Y")}
+        ends = {key: list(value) for key, value in given.items() if value is not None}
+        if ends and self.frame == MAP_FRAME:
+            from antdrive.base.plane import map_to_world
+            from antdrive.worlds import load_task
 
-        ends = {"start": pose("--start", self.start), "goal": numbers("--goal", self.goal, 2, "X,Y")}
-        given: dict[str, Any] = {key: value for key, value in ends.items() if value is not None}
-        task = load_task(world, self.task)
+            frame = load_task(world, self.task).frame
+            ends = {key: map_to_world(frame, [value])[0].tolist() for key, value in ends.items()}
+        return Written(world=world, task=self.task, **ends)  # type: ignore[arg-type]
+
+    def task_of(self, world: str) -> "Task":
+        """Return the task of a world with this start and goal."""
+        words = self.of(world)
         try:
-            if self.frame == MAP_FRAME:
-                given = {key: tuple(map_to_world(task.frame, [value])[0].tolist()) for key, value in given.items()}
-            return dataclasses.replace(task, **given)
+            return words.load_task()
         except FieldError as error:
-            frame = " (in the world frame)" if self.frame == MAP_FRAME and any(task.frame) else ""
-            raise InputError(f"--{error.key}: {error.problem}{frame}") from None
+            raise at_option(words, error.key, error.problem) from None
 
-    @property
-    def words(self) -> list[str]:
-        """Command-line arguments that give the same start and goal."""
-        given = {"--task": self.task, "--start": self.start, "--goal": self.goal}
-        if self.frame != WORLD_FRAME and (self.start is not None or self.goal is not None):
-            given["--frame"] = self.frame
-        return [f"{option}={value}" for option, value in given.items() if value is not None]
+
+def at_option(words: "Written", key: str, problem: str) -> InputError:
+    """Return the error for a key of a scenario on the command line, with its option."""
+    if key in ("world", "robot"):
+        return InputError(problem)
+    if key in ("start", "goal") and getattr(words, key) is None:
+        return input_error(str(words.world), key, problem)
+    return InputError(f"{key if key.startswith(GROUPS) else '--' + key.replace('_', '-')}: {problem}")
 
 
 @dataclass(frozen=True)
@@ -96,31 +103,24 @@ class Setup:
     ] = None
     robot: Robot = "turtlebot"
 
-    def scenario(self, world: "str | Task", given: Mapping[str, Any]) -> "Scenario":
-        """Build the scenario from the options and from `given`, which maps keys to settings as in files.
+    def scenario(self, place: "Written", given: Mapping[str, Any]) -> "Scenario":
+        """Build the scenario of a world from the options and from `given`, which maps keys to settings as in files.
 
         The margin "auto" calibrates the robot, unless a calibration exists.
         """
         from antdrive.planners.registry import parse
-        from antdrive.sim.forms import scenario_fields
-        from antdrive.sim.scenario import Scenario
 
         chosen: dict[str, dict[str, str]] = {group: {} for group in GROUPS}
         for text in self.settings or ():
             group, name, value = grouped(text, GROUPS)
             chosen[group][name] = value
         controller = {name: parse(f"controller.{name}", float, text) for name, text in chosen["controller"].items()}
-        auto = given.get("margin") == "auto"
-        values = {**given, "controller": controller, **({"margin": 0.0} if auto else {})}
-        try:
-            fields = scenario_fields(values)
-            scenario = Scenario.of(world, self.planner, self.robot, options=chosen["planner"], **fields)
-            return with_chosen_margin(scenario) if auto else scenario
-        except FieldError as error:
-            if error.key == "start":  # the robot overlaps an obstacle
-                raise input_error(world if isinstance(world, str) else world.world.name, str(error)) from None
-            option = error.key if error.key.startswith("controller") else f"--{error.key.replace('_', '-')}"
-            raise InputError(f"{option}: {error.problem}") from None
+        settings = {**given, "controller": controller}
+        seed = settings.pop("seed", place.seed)
+        words = dataclasses.replace(
+            place, planner=self.planner, options=chosen["planner"], robot=self.robot, settings=settings, seed=seed
+        )
+        return words.scenario(at=functools.partial(at_option, words), choose=with_chosen_margin)
 
 
 def grouped(text: str, groups: Collection[str]) -> tuple[str, str, str]:

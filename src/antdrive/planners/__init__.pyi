@@ -57,7 +57,6 @@ from .replanners import agent_for as agent_for
 from .replanners import replanner_for as replanner_for
 from .smoothing.smooth import SMOOTHINGS as SMOOTHINGS
 from .smoothing.smooth import pull_taut as pull_taut
-from .smoothing.smooth import route_along as route_along
 from .smoothing.smooth import smooth as smooth
 from .user_code import record_name as record_name
 from .validation import check_plan as check_plan

@@ -32,12 +32,7 @@ class Lead(NamedTuple):
 def ends(grid: Grid, task: Task, within: float) -> tuple[int, int]:
     """Return the start's node and the goal's flat cell on a grid with turns; -1 for an end without any.
 
-    The goal becomes the nearest free cell within a distance that moves reach from the start; without one, the nearest.
-
-    Args:
-        grid: a grid with turns
-        task: the task whose world was rasterised
-        within: farthest cell from the goal [m]
+    The goal becomes the nearest free cell within a distance [m] that moves reach from the start; without one, the nearest.
     """
     from antdrive.worlds import _kernels_turns
 
@@ -52,14 +47,9 @@ def entrance(grid: Grid, task: Task, nearest: npt.NDArray[np.int32]) -> int:
     """Return the node by which the robot enters a grid with turns from its exact start; -1 if it cannot.
 
     A lead turns on the spot, drives straight to the centre of the node's cell, and turns to a heading of the node. The node
-    is the first, in the order of way and turn, with a clear lead from which moves lead to a goal. Only where no lead forwards
-    reaches such a node, the robot leaves backwards, by at most `MAX_BACKWARDS`. Where no such node is near, it is any node of
-    the nearest free cell.
-
-    Args:
-        grid: a grid with turns
-        task: the task whose world was rasterised
-        nearest: which goal moves lead to from each node, -1 for none (N,)
+    is the first, in the order of way and turn, with a clear lead from which moves lead to a goal: `nearest` (N,), -1 for none.
+    Only where no lead forwards reaches such a node, the robot leaves backwards, by at most `MAX_BACKWARDS`. Where no such node
+    is near, it is any node of the nearest free cell.
     """
     from antdrive.planners import _kernels_entrances
 

@@ -32,11 +32,9 @@ class PlannerError(RuntimeError):
 
 
 def planner_errors(planner: Planner, name: str = "") -> contextlib.AbstractContextManager[None]:
-    """Return a block that turns exceptions into `PlannerError`, except `InputError`, Ctrl-C and SIGTERM.
+    """Return a block for a planner's code that turns exceptions into `PlannerError`, except `InputError`, Ctrl-C and SIGTERM.
 
-    Args:
-        planner: the planner whose code runs in the block
-        name: the planner's name in errors; empty: its class
+    Errors have the planner's name; without one, its class.
     """
 
     called = name or type(planner).__name__
@@ -56,12 +54,7 @@ def is_built_in(planner: Planner) -> bool:
 
 
 def place_of(planner: Planner, error: BaseException | None = None) -> str:
-    """Return the file and line of the planner's module that raised the error; without an error, of its `plan`.
-
-    Args:
-        planner: the planner
-        error: what it raised
-    """
+    """Return the file and line of the planner's module that raised the error; without an error, of its `plan`."""
     kind = type(planner)
     home = getattr(sys.modules.get(kind.__module__), "__file__", None)
     codes = [getattr(getattr(kind, name, None), "__code__", None) for name in ("plan", "_plan")]

@@ -80,11 +80,7 @@ _progress_callback: ContextVar[Callable[[Progress], None] | None] = ContextVar("
 
 @contextmanager
 def on_progress(callback: Callable[[Progress], None]) -> Iterator[None]:
-    """Make planners call `callback` after every iteration within this block.
-
-    Args:
-        callback: receives the progress; an exception that it raises ends planning
-    """
+    """Make planners call `callback` after every iteration within this block; an exception that it raises ends planning."""
     token = _progress_callback.set(callback)
     try:
         yield
@@ -154,12 +150,7 @@ class IterativePlanner(GridPlanner):
         return self.answer(query, self.iterate(query, rng))
 
     def answer(self, query: Query, states: Iterator[Iteration]) -> PlanResult:
-        """Return the plan after as many iterations as the options allow.
-
-        Args:
-            query: the query, with both ends free
-            states: the iterations yielded by `iterate`
-        """
+        """Return the plan after as many iterations (`states`) as the options allow; both ends of the query are free."""
         if not reachable(query):
             return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work_unit=self.work_unit)
         if query.start == query.goal:

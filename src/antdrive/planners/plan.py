@@ -302,12 +302,7 @@ class TimedPlan(PlanResult):
         return np.stack([np.interp(when, knots, np.repeat(self.xy[:, k], 2)) for k in (0, 1)], axis=-1)
 
     def clearance(self, movers: Iterable[MoverMotion], step: float = 0.01) -> float:
-        """Return the minimum distance between the robot's centre and a mover's surface [m].
-
-        Args:
-            movers: the motions of the movers
-            step: sampling period [s]
-        """
+        """Return the minimum distance between the robot's centre and a surface of `movers` [m], sampled every `step` [s]."""
         ticks = max(1, math.ceil(self.duration / step))
         t = np.linspace(self.arrive[0], self.arrive[-1], ticks + 1)
         xy = self.at(t)
@@ -407,12 +402,7 @@ class GridPlanner(abc.ABC):
 
 
 def path_cost(cells: npt.ArrayLike, cell: float) -> float:
-    """Return the length [m] of a path of cells (N, 2): a step costs 1 or sqrt(2) cell sides.
-
-    Args:
-        cells: (row, col) of each cell of the path
-        cell: side of a cell [m]
-    """
+    """Return the length [m] of a path of cells (N, 2) with sides of `cell` [m]: a step costs 1 or sqrt(2) sides."""
     steps = np.abs(np.diff(np.asarray(cells), axis=0)).sum(axis=1)
     diagonal = int((steps == 2).sum())
     return cell * (len(steps) - diagonal + math.sqrt(2.0) * diagonal)

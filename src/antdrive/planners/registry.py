@@ -12,11 +12,12 @@ import types
 import typing
 import warnings
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Union
 
 from antdrive.base import FieldError, InputError
-from antdrive.base.errors import input_error
+from antdrive.base.errors import visible
 from antdrive.base.guarded import OverLimit, UserCode, error_text, one_line, place
 from antdrive.base.optional import PLANNER_GROUP
 from antdrive.base.version import __version__
@@ -51,43 +52,41 @@ PLANNERS: Mapping[str, Planner] = MappingProxyType(
 DECORATOR = "@dataclass(frozen=True, kw_only=True)"
 
 
-def load_planner(name: str, /, **options: Any) -> Planner:
+def load_planner(name: str, home: Path | None = None, /, **options: Any) -> Planner:
     """Return the named planner with options set.
 
     Args:
         name: one of `list_planners()`, or FILE.py:CLASS or MODULE:CLASS for user code
+        home: folder of user code; None: the working directory
         options: the planner's options by name; values may be text, as from a command line
 
     Raises:
-        InputError: the planner or option is unknown, or the value is invalid; lists the valid choices.
+        InputError: the planner or option is unknown, or the value is invalid; lists the valid choices. Its key is `planner`,
+            or `planner.` and the option.
     """
-    if is_user_code(name) or name.endswith(".py"):
-        return make_planner(user_object(name), name, **options)
-    planner = PLANNERS.get(name)
-    if planner is None:
-        entry = _plugins().get(name)
-        if entry is None:
-            raise InputError(f"planner: {_unknown(name, [*PLANNERS, *_plugins()])}")
+    if is_user_code(name):
+        planner = _instance(user_object(name, home), f"planner {name!r}")
+    elif name in PLANNERS:
+        planner = PLANNERS[name]
+    elif (entry := _plugins().get(name)) is not None:
         planner = _load(entry)
+    else:
+        raise _error("planner", _unknown(name, [*PLANNERS, *_plugins()]))
     return _with_options(name, planner, options)
 
 
 def recorded_planner(name: str, /, **options: Any) -> Planner:
     """Return the planner with a name in a record: a registered one, or one of user code that this process has loaded."""
     own = name not in PLANNERS and name in LOADED
-    return make_planner(LOADED[name], name, **options) if own else load_planner(name, **options)
-
-
-def make_planner(made: Any, name: str, /, **options: Any) -> Planner:
-    """Return the planner defined in user code, with options set."""
-    return _with_options(name, _instance(made, f"planner {name!r}"), options)
+    return (
+        _with_options(name, _instance(LOADED[name], f"planner {name!r}"), options)
+        if own
+        else load_planner(name, **options)
+    )
 
 
 def planner_version(name: str) -> str:
-    """Return a planner's distribution and version, with the hash of its file for third-party planners.
-
-    Args:
-        name: a name for `load_planner`
+    """Return the distribution and version of the planner with a name, with the hash of its file for third-party planners.
 
     Raises:
         InputError: the planner is unknown.
@@ -140,16 +139,25 @@ def parse(key: str, kind: Any, value: Any) -> Any:
         for member in members:
             if value == member or (isinstance(value, str) and value == str(member)):
                 return member
-        raise InputError(f"{key}: must be one of {', '.join(map(str, members))}; got {value!r}")
+        raise _error(key, f"must be one of {', '.join(map(str, members))}; got {value!r}")
     if kind in _READERS:
         wanted, read = _READERS[kind]
         try:
             return read(value)
         except (ValueError, KeyError, OverflowError):
-            raise InputError(f"{key}: must be {wanted}, got {value!r}") from None
+            raise _error(key, f"must be {wanted}, got {value!r}") from None
     if isinstance(value, str):
-        raise InputError(f"{key}: cannot be given as text; set it from Python")
+        raise _error(key, "cannot be given as text; set it from Python")
     return value
+
+
+def _error(key: str, problem: str) -> InputError:
+    return FieldError(key, problem).as_input()
+
+
+def _unfit(message: str) -> InputError:
+    """Return the error of a third-party planner that cannot be used; the message names it."""
+    return InputError(visible(message), "planner")
 
 
 def _whole(value: Any) -> int:
@@ -200,15 +208,15 @@ def _with_options(name: str, planner: Planner, options: Mapping[str, Any]) -> Pl
     values: dict[str, Any] = {}
     for key, value in options.items():
         if key not in known:
-            raise InputError(f"planner.{key}: {_unknown(key, known, f'option of {name}')}")
+            raise _error(f"planner.{key}", _unknown(key, known, f"option of {name}"))
         values[key] = parse(f"planner.{key}", hints[key], value)
     try:
         with _loading(f"planner {name!r}", "", (ValueError,)):
             return typing.cast(Planner, dataclasses.replace(typing.cast(Any, planner), **values))
     except FieldError as error:
-        raise InputError(str(error.under("planner"))) from None
+        raise error.under("planner").as_input() from None
     except ValueError as error:  # from a third-party planner
-        raise InputError(f"planner: {one_line(str(error))}") from None
+        raise _error("planner", one_line(str(error))) from None
 
 
 def _fields(planner: Planner) -> tuple[dataclasses.Field[Any], ...]:
@@ -249,17 +257,17 @@ def _instance(made: Any, who: str, source: str = "") -> Planner:
     """Return a third-party object or class as a planner; `who` and `source` are for messages."""
     with _loading(who, source):
         if issubclass(type(made), type) and (lacking := _mismatch(made)):
-            raise InputError(f"{who} cannot be created{source}: give all its options default values ({lacking})")
+            raise _unfit(f"{who} cannot be created{source}: give all its options default values ({lacking})")
         if issubclass(type(made), type) and (problem := _undeclared_options(made)):
-            raise InputError(f"{who} cannot be created{source}: {problem}")
+            raise _unfit(f"{who} cannot be created{source}: {problem}")
         planner = made() if issubclass(type(made), type) else made
         if not isinstance(planner, Planner) or not callable(planner.plan):
-            raise InputError(
+            raise _unfit(
                 f"{who} is not a planner{source}: it has no method plan(query, rng); write one, "
                 "or inherit antdrive.planners.GridPlanner and write _plan(query, rng)"
             )
         if wrong := _mismatch(planner.plan, None, None):
-            raise InputError(f"{who} is not a planner{source}: its method must be plan(query, rng) ({wrong})")
+            raise _unfit(f"{who} is not a planner{source}: its method must be plan(query, rng) ({wrong})")
     return planner
 
 
@@ -288,7 +296,7 @@ def _loading(who: str, source: str, passing: tuple[type[Exception], ...] = ()) -
         problem = f"{error_text(error)} ({place(error, None)})"
         if issubclass(type(error), OverLimit):
             return PlannerError(who.removeprefix("planner "), problem)
-        return input_error(f"{who} cannot be loaded{source}: {problem}")
+        return _unfit(f"{who} cannot be loaded{source}: {problem}")
 
     return UserCode(who, error_of, passing)
 

@@ -20,7 +20,7 @@ from types import CodeType, ModuleType
 from typing import Any
 
 from antdrive.base.document import MAX_BYTES
-from antdrive.base.errors import InputError, input_error
+from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import file_name, read_bytes
 from antdrive.base.guarded import OverLimit, UserCode, error_text, place, value_text
 from antdrive.planners.errors import PlannerError
@@ -39,24 +39,18 @@ _ASIDE: dict[Path, dict[str, ModuleType]] = {}
 
 def is_user_code(name: str) -> bool:
     """Return whether a planner's name refers to a file or module instead of the registry."""
-    return ":" in name
+    return ":" in name or name.endswith(".py")
 
 
 def record_name(name: str) -> str:
-    """Return a planner's name in records and tables: the registered name, or the class name in user code.
-
-    Args:
-        name: a name for `load_planner`
-    """
+    """Return a planner's name in records and tables: the registered name, or the class name in user code."""
     return name.rpartition(":")[2]
 
 
 def label_names(names: Sequence[str], taken: Collection[str] = ()) -> list[str]:
     """Return labels for tables and folders: `Greedy` for `mine.py:Greedy`, or `mine-Greedy` if another planner is a Greedy.
 
-    Args:
-        names: different names for `load_planner`
-        taken: further labels in use
+    The names differ; labels in `taken` are in use.
     """
     short = [record_name(name) for name in names]
     used = Counter([*short, *taken])
@@ -72,57 +66,48 @@ def label_names(names: Sequence[str], taken: Collection[str] = ()) -> list[str]:
     return found
 
 
-class UserCodeError(InputError):
-    """An error of a user's file or module: it is missing, fails to import, or lacks the class.
-
-    Attributes:
-        problem: the error on one line
-        of_class: whether only the class is missing
-    """
-
-    def __init__(self, problem: str, of_class: bool = False) -> None:
-        super().__init__(str(input_error(problem)), of_class)
-        self.problem, self.of_class = str(self.args[0]), of_class
-
-    def __str__(self) -> str:
-        return f"planner: {self.problem}"
+def _error(problem: str) -> InputError:
+    """Return the error of a user's file or module: it is missing, fails to import, or lacks the class."""
+    return FieldError("planner", problem).as_input()
 
 
-def user_object(name: str) -> Any:
-    """Return the object of a user's file or module that the part after the last colon names."""
-    source, _, word = (f"{name}:" if name.endswith(".py") else name).rpartition(":")
-    LOADED[word] = load_object(source, word, is_file=source.endswith(".py"))
-    return LOADED[word]
-
-
-def load_object(source: str, word: str, folder: Path | None = None, *, is_file: bool) -> Any:
+def user_object(name: str, home: Path | None = None) -> Any:
     """Return a named object of a user's file or module.
 
     A file is read again after its content changes. Different folders may contain modules of the same name.
+
+    Args:
+        name: FILE.py:NAME or MODULE:NAME
+        home: folder of the file or the module; None: the working directory
     """
+    source, _, word = (f"{name}:" if name.endswith(".py") else name).rpartition(":")
+    is_file = source.endswith(".py")
+    if is_file and home is not None and not (home / source).is_file():
+        raise _error(f"{source}: no such file beside the suite")
     with UserCode(f"planner {source}:{word}", functools.partial(_import_error, source)):
-        module = _from_file(source, folder) if is_file else _from_module(source, folder)
+        module = _from_file(source, home) if is_file else _from_module(source, home)
     if not word:
-        raise UserCodeError(f"{source} names no class; write {source}:CLASS; {_choices(module, word)}", of_class=True)
+        raise _error(f"{source} names no class; write {source}:CLASS; {_choices(module, word)}")
     if not hasattr(module, word):
-        raise UserCodeError(f"{source} has no {word!r}; {_choices(module, word)}", of_class=True)
-    return getattr(module, word)
+        raise _error(f"{source} has no {word!r}; {_choices(module, word)}")
+    LOADED[word] = getattr(module, word)
+    return LOADED[word]
 
 
-def _import_error(source: str, error: BaseException) -> UserCodeError | PlannerError:
+def _import_error(source: str, error: BaseException) -> InputError | PlannerError:
     """Return the error of a file or module that cannot be imported."""
     at = place(error, os.path.realpath(source))
     if issubclass(type(error), OverLimit):
         return PlannerError(source, f"{error_text(error)} on import ({at})")
     if issubclass(type(error), SystemExit):
         problem = f"{source}: calls exit on import (exit code {value_text(error.args[0] if error.args else 0)}, {at})"
-        return UserCodeError(f'{problem}; guard its script code with if __name__ == "__main__"')
+        return _error(f'{problem}; guard its script code with if __name__ == "__main__"')
     for frame, _ in traceback.walk_tb(error.__traceback__):
         declared = frame.f_locals.get("cls")
         if frame.f_code.co_name == "_process_class" and FROZEN_BASE in error_text(error):
             name = getattr(declared, "__name__", "the class")
-            return UserCodeError(f"{source}: {name} needs @dataclass(frozen=True), as its base class has ({at})")
-    return UserCodeError(f"{source}: cannot be imported ({', '.join(filter(None, (error_text(error), at)))})")
+            return _error(f"{source}: {name} needs @dataclass(frozen=True), as its base class has ({at})")
+    return _error(f"{source}: cannot be imported ({', '.join(filter(None, (error_text(error), at)))})")
 
 
 def is_importable_elsewhere(planner: object) -> bool:
@@ -158,7 +143,7 @@ def _content(path: Path) -> bytes:
     try:
         return read_bytes(path, MAX_BYTES, "a Python file")
     except InputError as error:
-        raise UserCodeError(str(error)) from None
+        raise _error(str(error)) from None
 
 
 def _choices(module: ModuleType, word: str) -> str:
@@ -181,7 +166,7 @@ def _from_module(name: str, folder: Path | None) -> ModuleType:
     if own is not None and taken is not None and Path(taken).resolve() != own:
         where = "beside the suite" if folder is not None else "in the working directory"
         problem = f"{top} is imported from {taken}, but another one exists {where}"
-        raise UserCodeError(f"{problem}; rename it, or name its file")
+        raise _error(f"{problem}; rename it, or name its file")
     return module
 
 

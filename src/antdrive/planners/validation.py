@@ -30,13 +30,7 @@ NEAR = 1e-6  # tolerance of waypoints and clearances [m]
 
 
 def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name: str = "") -> PlanResult:
-    """Return a planner's plan without checking it.
-
-    Args:
-        planner: the planner
-        query: the query
-        rng: the planner's source of randomness
-        name: the planner's name in errors; empty: its class
+    """Return a planner's plan without checking it; errors have the planner's name, without one its class.
 
     Raises:
         InputError: the planner rejects the query.
@@ -52,12 +46,7 @@ def request_plan(planner: Planner, query: Query, rng: np.random.Generator, name:
 
 
 def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
-    """Return the answer of a planner or its replanner if it is a `PlanResult`.
-
-    Args:
-        planner: the planner
-        answer: the returned value
-        name: the planner's name in errors; empty: its class
+    """Return the answer of a planner or its replanner if it is a `PlanResult`; errors are named as in `request_plan`.
 
     Raises:
         PlannerError: the answer has another type, or a field that raises an exception.
@@ -74,12 +63,7 @@ def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
 
 
 def checked(query: Query, answer: PlanResult) -> PlanResult:
-    """Return the plan if it is valid, else one without a path, with status `INVALID` and the reason.
-
-    Args:
-        query: the query
-        answer: the planner's answer
-    """
+    """Return the planner's answer if it is valid, else one without a path, with status `INVALID` and the reason."""
     problem = check_plan(query, answer)
     if not problem:
         # Copied: the planner may reuse its arrays.
@@ -99,17 +83,13 @@ def _arrays(answer: PlanResult) -> list[str]:
 
 
 def check_plan(query: Query, result: PlanResult) -> str:
-    """Return the first error in a plan and its place; empty if the plan is valid.
+    """Return the first error in the `result` of a planner and its place; empty if the plan is valid.
 
     Cells run from start to goal along allowed moves; their cost is that of `path_cost`. Waypoints join the same ends
     and keep the clearance; `length` is that of a curve that rounds their corners. From a start with less clearance,
     the first leg comes no closer within `end_reach`. Waypoints are no longer than `longest_line` allows for their
     cells. A plan with waypoints may have an infinite cost: the grid has no path, and the cells are those under
     the line. The times of a `TimedPlan` increase. Paths of plans that stopped early are checked as well.
-
-    Args:
-        query: the query
-        result: the planner's answer
     """
     problem = _types(result) or _figure_data(query, result)
     if problem:
@@ -225,13 +205,7 @@ def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
 
 
 def check_step(query: Query, cell: Cell, to: Any) -> str:
-    """Return the error in a cell-by-cell planner's step; empty for an allowed move or a wait.
-
-    Args:
-        query: the query
-        cell: the robot's cell
-        to: the next cell, or None to wait
-    """
+    """Return the error in a cell-by-cell planner's step from `cell` to `to`, None for a wait; empty for an allowed one."""
     for key, value in (("cell", cell), ("step", to)):
         if not (_is_cell(value) or (key == "step" and to is None)):
             return f"{key}: must be a cell (row, col){' or None' * (key == 'step')}, got {value_text(value)}"

@@ -8,8 +8,6 @@ from .control.pursuit import PurePursuit as PurePursuit
 from .control.pursuit import PursuitState as PursuitState
 from .control.pursuit import TrackedPath as TrackedPath
 from .control.pursuit import Twist as Twist
-from .control.speed_limits import SpeedProfile as SpeedProfile
-from .control.speed_limits import speed_profile as speed_profile
 from .lidar import Lidar as Lidar
 from .noise import NoiseModel as NoiseModel
 from .robot_file import list_robots as list_robots

@@ -21,14 +21,9 @@ WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
 
 
 def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike) -> Floats:
-    """Return the distance from the footprint at each pose to the nearest disc or wall, shape (N,) [m].
+    """Return the distance from the footprint at each of `poses` (N, 3) [m, rad] to the nearest disc or wall, shape (N,) [m].
 
-    Negative for overlaps; the magnitude is then a bound on the depth, not the exact depth.
-
-    Args:
-        world: the discs and walls
-        footprint: the robot's footprint
-        poses: x, y and yaw of the robot's centre, shape (N, 3) [m, rad]
+    Negative for overlaps; the magnitude is then a bound on the depth, not the exact depth. Movers do not count.
     """
     from antdrive.robots import _kernels_footprint
 
@@ -46,12 +41,7 @@ def kernel_shape(footprint: Footprint) -> tuple[Floats, Floats]:
 
 
 def outline_of(footprint: Footprint, margin: float) -> Outline:
-    """Return a footprint with a margin as the outline of plans; without corners for a disc around the axle.
-
-    Args:
-        footprint: the robot's footprint
-        margin: clearance on all sides [m]
-    """
+    """Return a footprint with a margin [m] as the outline of plans; without corners for a disc around the axle."""
     from antdrive.worlds.headings import Outline  # imports the compiler
 
     a, b, box = footprint.half_length, footprint.half_width, footprint.corners
@@ -107,13 +97,8 @@ def obstacle_name(world: World, index: int, unseen: int = 0) -> str:
 def overlap_at(world: World, spec: RobotSpec, pose: Pose, unseen: tuple[Disc, ...] = ()) -> str:
     """Describe the footprint's deepest overlap at a pose at a run's start; empty if there is none.
 
-    Surfaces closer than `TOUCHING` touch. Movers count, except wanderers whose place depends on the seed.
-
-    Args:
-        world: the obstacles, walls and movers
-        spec: the robot
-        pose: x, y and yaw of its centre [m, rad]
-        unseen: further obstacles, placed after planning
+    Surfaces closer than `TOUCHING` touch. `unseen` obstacles count, and movers, except wanderers whose place depends on the
+    seed.
     """
     starts = {i: first_place(mover, world.bounds, world.discs) for i, mover in enumerate(world.movers)}
     movers = {i: Disc(*place, world.movers[i].radius) for i, place in starts.items() if place is not None}

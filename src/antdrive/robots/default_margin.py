@@ -2,6 +2,9 @@
 
 Calibration (`antdrive.runs.margins.choice`) measures the same loss by drives. The constants below are fitted to it, see
 `docs/notebook/margins.md`.
+
+In all functions `noise` is a factor on the robot's documented noise, and `smoothing` says how plans become routes. `margin` is
+the clearance of plans on top of the robot's radius [m].
 """
 
 from __future__ import annotations
@@ -35,12 +38,6 @@ def default_margin(robot: RobotSpec, controller: PurePursuit, noise: float, smoo
     The controller spends up to a fraction `1 - lookahead_margin` of the margin on cutting corners, as far as the robot's
     width reaches its circumscribed circle. The rest must hold the loss by noise and a reserve. On smooth routes the robot
     passes obstacles sideways, so its width also reduces the loss by noise.
-
-    Args:
-        robot: the robot
-        controller: its controller
-        noise: factor on the robot's documented noise
-        smoothing: how plans become routes
     """
     if not (noise and robot.noise.nonzero):
         return LEAST
@@ -56,14 +53,7 @@ def default_margin(robot: RobotSpec, controller: PurePursuit, noise: float, smoo
 
 
 def noise_loss(robot: RobotSpec, controller: PurePursuit, noise: float, smoothing: str) -> float:
-    """Return the loss of clearance by noise that one drive in a thousand exceeds [m].
-
-    Args:
-        robot: the robot
-        controller: its controller
-        noise: factor on the robot's documented noise
-        smoothing: how plans become routes
-    """
+    """Return the loss of clearance by noise that one drive in a thousand exceeds [m]."""
     return DEVIATIONS[smoothing] * deviation(robot, controller, noise, raw=smoothing == "none")
 
 
@@ -72,11 +62,6 @@ def clearances_off_route(robot: RobotSpec, controller: PurePursuit, noise: float
 
     They hold the same losses as margins, and the reserve. Such motions are chosen again in each control period, so no long turn
     adds its slip.
-
-    Args:
-        robot: the robot
-        controller: its controller
-        noise: factor on the robot's documented noise
     """
     if not (noise and robot.noise.nonzero):
         return RESERVE, RESERVE + LINE_ROUNDING
@@ -85,16 +70,10 @@ def clearances_off_route(robot: RobotSpec, controller: PurePursuit, noise: float
 
 
 def deviation(robot: RobotSpec, controller: PurePursuit, noise: float, *, raw: bool) -> float:
-    """Return the standard deviation of a robot from its route beside an obstacle, by noise [m].
+    """Return the standard deviation of a robot from its route beside an obstacle, by noise [m]; a `raw` route has corners.
 
     Three independent parts add up: the estimated position; the estimated heading, over the lookahead; and wheel slip, whose
     yaw rate moves the robot off the route until the slip's correlation time has passed, or the lookahead of a route with corners.
-
-    Args:
-        robot: the robot
-        controller: its controller
-        noise: factor on the robot's documented noise
-        raw: whether the route has corners
     """
     levels, c = robot.noise.scaled(noise), controller
     speed = min(robot.max_speed, c.min_speed_near_obstacles + LEAST / c.clearance_time)
@@ -110,11 +89,6 @@ def line_margin(robot: RobotSpec, controller: PurePursuit, noise: float) -> floa
     """Return the margin of the outline on routes of lines, unless a scenario gives one [m].
 
     Without noise, the outline leaves its planned sweep where the robot passes a small corner without a stop.
-
-    Args:
-        robot: the robot
-        controller: its controller
-        noise: factor on the robot's documented noise
     """
     loss = LINE_ROUNDING + PASSED * robot.radius
     if noise and robot.noise.nonzero:
@@ -125,25 +99,12 @@ def line_margin(robot: RobotSpec, controller: PurePursuit, noise: float) -> floa
 def outline_margins(
     robot: RobotSpec, controller: PurePursuit, noise: float, margin: float, *, of_lines: bool
 ) -> tuple[float, ...]:
-    """Return the clearances of plans for the footprint, in turn until there is a path [m].
-
-    Args:
-        robot: the robot
-        controller: its controller
-        noise: factor on the robot's documented noise
-        margin: clearance of plans on top of the robot's radius [m]
-        of_lines: whether the margin of lines comes first
-    """
+    """Return the clearances of plans for the footprint, in turn until there is a path, that of lines first if asked for [m]."""
     return tuple(dict.fromkeys((max(margin, line_margin(robot, controller, noise)), margin) if of_lines else (margin,)))
 
 
 def mapless_margins(margins: tuple[float, ...], margin: float) -> tuple[float, ...]:
-    """Return the clearances of a mapless robot's plans for its footprint, in turn [m].
-
-    Args:
-        margins: those of `outline_margins`
-        margin: clearance of plans on top of the robot's radius [m]
-    """
+    """Return the clearances of a mapless robot's plans for its footprint, in turn, after those of `outline_margins` [m]."""
     return tuple(dict.fromkeys((*margins, min(TURNABLE, margin), 0.0, SQUEEZED)))
 
 
@@ -151,13 +112,7 @@ def line_deviation(robot: RobotSpec, controller: PurePursuit, noise: float, turn
     """Return the standard deviation of the outline's farthest corner from its planned sweep, by noise [m].
 
     Independent parts add up: the estimated position; the heading, over the circumscribed radius and the distance over which
-    errors decay; wheel slip on straights, which bends the path over that distance; and slip during a turn on the spot.
-
-    Args:
-        robot: the robot
-        controller: its controller
-        noise: factor on the robot's documented noise
-        turn: the longest turn [rad]
+    errors decay; wheel slip on straights, which bends the path over that distance; and slip during a `turn` on the spot [rad].
     """
     levels = robot.noise.scaled(noise)
     speed = min(robot.max_speed, controller.min_speed_near_obstacles + LEAST / controller.clearance_time)

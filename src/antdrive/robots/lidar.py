@@ -79,29 +79,16 @@ class Lidar:
         return np.asarray(self.yaw + first + self.spacing * np.arange(self.beams), dtype=np.float64)
 
     def at(self, hz: int) -> Lidar:
-        """Return the lidar with at most one scan per control period.
-
-        Args:
-            hz: control periods per second
-        """
+        """Return the lidar with at most one scan per control period, of which there are `hz` a second."""
         return self if self.rate <= hz else dataclasses.replace(self, rate=float(hz))
 
     def pose_on(self, pose: Pose) -> Pose:
-        """Return the lidar's pose in the world: x, y [m] and yaw [rad].
-
-        Args:
-            pose: the robot's pose
-        """
+        """Return the lidar's pose in the world on a robot at a pose: x, y [m] and yaw [rad]."""
         x, y, yaw = pose
         cos, sin = math.cos(yaw), math.sin(yaw)
         return x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, yaw + self.yaw
 
     def due(self, tick: int, hz: int) -> bool:
-        """Return whether a scan is due in a control period.
-
-        Args:
-            tick: index of the control period
-            hz: control periods per second
-        """
+        """Return whether a scan is due in the control period with index `tick`, of `hz` a second."""
         per_tick = self.rate / hz
         return tick == 0 or math.floor(tick * per_tick) != math.floor((tick - 1) * per_tick)

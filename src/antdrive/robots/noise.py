@@ -84,11 +84,7 @@ class NoiseModel:
         return pose
 
     def actuate(self, command: Twist) -> Twist:
-        """Return the velocity of the wheels: the delayed command with slip.
-
-        Args:
-            command: the new command; it takes effect after the delay
-        """
+        """Return the velocity of the wheels: the delayed command with slip. A new `command` takes effect after the delay."""
         self._pending.append(command)
         delayed = self._pending.popleft()
         keep = math.exp(-self._period / SLIP_TIME)
@@ -116,12 +112,7 @@ def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
 
 
 def steady_errors(noise: Noise, track: float) -> tuple[float, float]:
-    """Return the standard deviations of the estimate in x or y [m] and in heading [rad] at 1 m/s.
-
-    Args:
-        noise: the levels
-        track: distance between the wheels [m]
-    """
+    """Return the standard deviations of the estimate in x or y [m] and in heading [rad] at 1 m/s; `track` is in metres."""
     gain_xy, gain_yaw = _gains(noise, track)
     return math.sqrt(gain_xy) * noise.pose_xy, math.sqrt(gain_yaw) * noise.pose_yaw
 

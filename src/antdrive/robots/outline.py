@@ -36,23 +36,12 @@ class Footprint:
 
     @classmethod
     def disc(cls, radius: float, centre: Point = (0.0, 0.0)) -> Footprint:
-        """Return a disc.
-
-        Args:
-            radius: its radius [m]
-            centre: its centre, from the axle's centre [m]
-        """
+        """Return a disc of a radius [m] around a `centre`, from the axle's centre [m]."""
         return cls(rounding=radius, corners=(centre,) if any(centre) else ())
 
     @classmethod
     def rectangle(cls, length: float, width: float, centre: Point = (0.0, 0.0)) -> Footprint:
-        """Return a rectangle.
-
-        Args:
-            length: along the robot's heading [m]
-            width: across it [m]
-            centre: its centre, from the axle's centre [m]
-        """
+        """Return a rectangle of a length along the robot's heading, a `width` and a `centre`, from the axle's centre [m]."""
         a, b, (x, y) = length / 2, width / 2, centre
         if not any(centre):
             return cls(half_length=a, half_width=b)
@@ -61,10 +50,7 @@ class Footprint:
 
     @classmethod
     def polygon(cls, points: Sequence[Sequence[float]]) -> Footprint:
-        """Return a convex polygon.
-
-        Args:
-            points: its corners in order, clockwise or counter-clockwise (K, 2) [m]
+        """Return the convex polygon of corners in order, clockwise or counter-clockwise: `points` (K, 2) [m].
 
         Raises:
             FieldError: the points are not a convex polygon, or too many.
@@ -123,12 +109,7 @@ class Footprint:
         return xmax - xmin, ymax - ymin, ((xmin + xmax) / 2, (ymin + ymax) / 2)
 
     def depth(self, x: float, y: float) -> float:
-        """Return a point's depth in the footprint: its distance from the edge, negative outside [m].
-
-        Args:
-            x: ahead of the axle [m]
-            y: to the left of its centre [m]
-        """
+        """Return the distance from the edge of a point `x` ahead of the axle and `y` to the left, negative outside [m]."""
         if self.corners:
             return self.rounding - _beyond(self.corners, (x, y))
         ahead, aside = self.half_length - abs(x), self.half_width - abs(y)
@@ -137,12 +118,7 @@ class Footprint:
         return self.rounding - math.hypot(min(ahead, 0.0), min(aside, 0.0))
 
     def nearest(self, x: float, y: float) -> Point:
-        """Return the nearest point of the footprint without its rounding [m].
-
-        Args:
-            x: ahead of the axle [m]
-            y: to the left of its centre [m]
-        """
+        """Return the point of the footprint without its rounding that is nearest to (`x`, `y`), as in `depth` [m]."""
         if not self.corners:
             a, b = self.half_length, self.half_width
             return min(max(x, -a), a), min(max(y, -b), b)
@@ -151,11 +127,7 @@ class Footprint:
         return min((_on_edge(a, b, (x, y)) for a, b in _around(self.corners)), key=lambda at: math.dist(at, (x, y)))
 
     def reach(self, direction: float) -> float:
-        """Return the distance from the axle's centre to the edge in a direction [m].
-
-        Args:
-            direction: counter-clockwise from straight ahead [rad]
-        """
+        """Return the distance from the axle's centre to the edge in a `direction`, counter-clockwise from ahead [rad] [m]."""
         low, high = 0.0, self.radius
         for _ in range(60):  # bisection: the footprint is convex and contains the axle's centre
             middle = (low + high) / 2
@@ -164,11 +136,7 @@ class Footprint:
         return low
 
     def outline(self, steps: int = 16) -> list[Point]:
-        """Return points on the outline, counter-clockwise [m].
-
-        Args:
-            steps: points for each quarter turn of a round corner
-        """
+        """Return points on the outline, counter-clockwise, `steps` for each quarter turn of a round corner [m]."""
         a, b, r = self.half_length, self.half_width, self.rounding
         corners = self.corners or ((a, b), (-a, b), (-a, -b), (a, -b))
         if not r:

@@ -11,9 +11,9 @@ from typing import Annotated, Any, TypeAlias, get_type_hints
 from pydantic import BaseModel, Field, create_model, model_validator
 
 from antdrive.base.caches import cached
-from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_of
-from antdrive.base.document import Document, parse_document, read_yaml
-from antdrive.base.errors import FieldError, input_error
+from antdrive.base.checks import OneLine, SchemaVersion, check, file_schema, resolve
+from antdrive.base.document import parse_document, read_yaml
+from antdrive.base.errors import FieldError, InputError, input_error, visible
 from antdrive.base.records import STRICT
 from antdrive.robots.outline import MAX_CORNERS
 from antdrive.robots.spec import Footprint, RobotSpec, require_feasible
@@ -96,48 +96,32 @@ def list_robots() -> Mapping[str, Path]:
     return {path.stem: path for path in sorted(_CATALOG.glob("*.yaml"))}
 
 
-def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
+def load_robot(robot: str | os.PathLike[str], home: Path | None = None) -> RobotSpec:
     """Load a robot's specification.
 
     Args:
         robot: a file's path, or a name from `list_robots`
+        home: base of relative paths; None: the working directory
 
     Raises:
         InputError: the file does not exist or is invalid.
     """
     try:
-        path = resolve("robot", robot, list_robots())
+        path = resolve("robot", robot, list_robots(), home)
     except FieldError as error:
-        raise input_error(error.problem) from None
+        raise InputError(visible(error.problem), error.key) from None
     if path.suffix.lower() in (".urdf", ".xacro"):
         raise input_error(str(path), f"not a robot file; convert it with: antdrive robots import {path}")
-    return _robot_in(read_yaml(path), os.fspath(path), path.stem)
-
-
-def robot_from_text(text: str, source: str, stem: str) -> RobotSpec:
-    """Parse the text of a robot file."""
-    return _robot_in(text, source, stem)
+    return robot_from_text(read_yaml(path), os.fspath(path), path.stem)
 
 
 @cached(16)
-def _robot_in(text: str, source: str, stem: str) -> RobotSpec:
+def robot_from_text(text: str, source: str, stem: str) -> RobotSpec:
     """Parse the text of a robot file."""
     document = parse_document(text, source)
     if isinstance(document.data, dict):
         document.data.setdefault("name", "".join(filter(str.isprintable, stem))[:200] or "robot")
-    entry = check(RobotFile, document)
-    return _to_spec(entry, document)
-
-
-def robot_schema() -> dict[str, Any]:
-    """Return the JSON Schema of robot files, for editors."""
-    schema = schema_of(RobotFile)
-    required = [key for key in schema["required"] if key != "name"]
-    draft = "https://json-schema.org/draft/2020-12/schema"
-    return {"$schema": draft, **schema, "required": required, "title": "antdrive robot"}
-
-
-def _to_spec(entry: Any, document: Document) -> RobotSpec:
+    entry: Any = check(RobotFile, document)
     values = {field.name: getattr(entry, field.name) for field in dataclasses.fields(RobotSpec)}
     try:
         spec = RobotSpec(**{**values, "footprint": entry.footprint.footprint()})
@@ -145,6 +129,11 @@ def _to_spec(entry: Any, document: Document) -> RobotSpec:
     except FieldError as error:
         raise document.field_error(error) from None
     return spec
+
+
+def robot_schema() -> dict[str, Any]:
+    """Return the JSON Schema of robot files, for editors."""
+    return file_schema(RobotFile, "antdrive robot")
 
 
 def robot_to_dict(spec: RobotSpec) -> dict[str, Any]:

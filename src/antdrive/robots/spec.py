@@ -9,7 +9,7 @@ from typing import Annotated
 
 from annotated_types import Interval
 
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import format_point
 from antdrive.base.records import require_ranges
 from antdrive.robots.lidar import Lidar
@@ -47,11 +47,7 @@ class Odometry:
         require_ranges(self)
 
     def scaled(self, factor: float) -> Odometry:
-        """Return the errors multiplied by a factor; 0 is perfect odometry.
-
-        Args:
-            factor: the multiplier
-        """
+        """Return the errors multiplied by a `factor`; 0 is perfect odometry."""
         return Odometry(**{field.name: getattr(self, field.name) * factor for field in dataclasses.fields(self)})
 
 
@@ -150,13 +146,12 @@ class RobotSpec:
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, float | int) and not (math.isfinite(value) and value > 0):
-                raise FieldError(field.name, f"must be greater than 0, got {value:g}")
+            if isinstance(value, float | int):
+                require(field.name, value, above=0)
         require_ranges(self)
         foot = self.footprint
         for key in ("half_length", "half_width", "rounding"):
-            if not getattr(foot, key) >= 0:
-                raise FieldError(f"footprint.{key}", f"must be at least 0, got {getattr(foot, key):g}")
+            require(f"footprint.{key}", getattr(foot, key), at_least=0)
         try:
             foot.require_convex()
         except FieldError as error:
@@ -235,13 +230,13 @@ def require_feasible(spec: RobotSpec) -> None:
     turn = 2 * rim / spec.track
     _require_reached("max_wheel_speed", f"{spec.max_wheel_speed:g} rad/s", spec, "max_yaw_rate", turn, "rad/s")
     motor = spec.wheel_torque / spec.wheel_radius
-    grip = spec.wheel_friction * spec.mass * GRAVITY / 2
+    grip, inertia = spec.wheel_friction * spec.mass * GRAVITY / 2, yaw_inertia(spec.mass, spec.footprint)
     for key, what, force in (
         ("wheel_torque", f"motors of {spec.wheel_torque:g} N m", motor),
         ("wheel_friction", f"a friction of {spec.wheel_friction:g}", grip),
     ):
         _require_reached(key, what, spec, "max_acceleration", 2 * force / spec.mass, "m/s2")
-        _require_reached(key, what, spec, "max_yaw_acceleration", force * spec.track / yaw_inertia(spec), "rad/s2")
+        _require_reached(key, what, spec, "max_yaw_acceleration", force * spec.track / inertia, "rad/s2")
     held = spec.wheel_friction * GRAVITY
     what = f"a friction of {spec.wheel_friction:g}"
     _require_reached("wheel_friction", what, spec, "max_lateral_acceleration", held, "m/s2")
@@ -258,13 +253,8 @@ def require_on_robot(lidar: Lidar, foot: Footprint) -> None:
         )
 
 
-def yaw_inertia(spec: RobotSpec) -> float:
-    """Return the moment of inertia of a uniform body about the vertical axis through the axle's centre [kg m^2]."""
-    return yaw_inertia_of(spec.mass, spec.footprint)
-
-
-def yaw_inertia_of(mass: float, foot: Footprint) -> float:
-    """Return the moment of inertia of a mass [kg] spread evenly over a footprint [kg m^2]."""
+def yaw_inertia(mass: float, foot: Footprint) -> float:
+    """Return the moment of inertia of a mass [kg] spread evenly over a footprint, about the axle's centre [kg m^2]."""
     if len(foot.corners) == 1:
         (x, y), r = foot.corners[0], foot.rounding
         return mass * (r**2 / 2 + x**2 + y**2)

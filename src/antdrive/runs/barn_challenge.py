@@ -179,7 +179,7 @@ class BarnTable:
         known = [replace(self.known, world="all, with the map")] if self.known else []
         yield from table(HEADS, (row.cells for row in (*self.rows, *known)))
         yield f"score: {FORMULA}"
-        yield "exact score: OT = length of the exact shortest path / 2 m/s"
+        yield "exact score: T = length of the exact shortest path / 2 m/s in place of OT"
         yield ""
         if self.price:
             yield self.price.sentence

@@ -33,12 +33,6 @@ COMPARED = {
 PATH = "planned → driven m"  # heading of `path_text`
 
 
-def mark_of(scenarios: Mapping[str, Scenario], cases: Sequence[tuple[str, int]]) -> str:
-    """Return eight hexadecimal digits that identify a comparison."""
-    facts = [f"{key} {scenario.identity()[:8]}" for key, scenario in scenarios.items()]
-    return hashlib.sha256(repr((facts, list(cases))).encode()).hexdigest()[:8]
-
-
 def drive_hash(log: Rollout) -> str:
     """Return the SHA-256 of a drive alone: its world, its route and its arrays, without the plan behind the route."""
     # `Rollout.digest` also covers the planned cells, which smoothing may turn into the same route.

@@ -338,12 +338,6 @@ class Pool:
         waiting.put_back(worker.handed)
 
 
-def call_all(calls: Iterable[Callable[[], Result]], jobs: int | None = None) -> list[Result]:
-    """Return the results of calls without arguments, run in processes (None: one per core)."""
-    with Pool(processes_for(jobs)) as pool:
-        return list(pool.results(call_now, calls))
-
-
 def call_now(call: Callable[[], Result]) -> Result:
     """Return the result of a call; `operator.call` needs Python 3.11."""
     return call()

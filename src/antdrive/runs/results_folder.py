@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,11 @@ from typing import Any
 from antdrive.base.atomic import LOCK, folder_lock
 from antdrive.base.errors import input_error
 from antdrive.base.files import MAX_JSON_BYTES, parse_json, read_bytes, write_json
+
+
+def mark_of(*facts: object) -> str:
+    """Return eight hexadecimal digits that identify the contents of a folder."""
+    return hashlib.sha256(repr(facts).encode()).hexdigest()[:8]
 
 
 def free_folder(folder: Path, manifest: str, own: str) -> Path:

@@ -123,7 +123,7 @@ class _Sees(Form):
 
 class _Discs(Form):
     def read(self, key: str, value: Any) -> tuple[Disc, ...]:
-        return tuple(value)
+        return tuple(Disc(**disc) if isinstance(disc, dict) else disc for disc in value)
 
     def write(self, value: Any) -> Any:
         return [{name: float(number) for name, number in dataclasses.asdict(disc).items()} for disc in value]
@@ -133,7 +133,7 @@ class _Discs(Form):
 
     def words(self, flag: str, value: Any) -> list[str] | None:
         discs = [disc if isinstance(disc, dict) else vars(disc) for disc in value]
-        if any(disc["height"] != 1.0 for disc in discs):
+        if any(disc.get("height", 1.0) != 1.0 for disc in discs):
             return None
         return [word for disc in discs for word in (flag, f"{disc['x']},{disc['y']},{disc['radius']}")]
 
@@ -189,7 +189,7 @@ class _Switched(_Record):
         return None if value == "none" else self.off if value is False else super().read(key, value)
 
     def write(self, value: Any) -> Any:
-        return "none" if value is None else changes(value, self.default) or True
+        return "none" if value is None else False if value == self.off else super().write(value) or True
 
     def words(self, flag: str, value: Any) -> list[str] | None:
         if isinstance(value, dict) or (value == "none" and self.off is not None):

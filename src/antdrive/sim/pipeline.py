@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -13,12 +14,11 @@ from antdrive.planners import PlanResult, PlanStatus
 from antdrive.sim.compose import compose, warm_up_replanning
 from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
 from antdrive.sim.driving.plants import Bullet
+from antdrive.sim.facts import LoggedRun, result_of
 from antdrive.sim.log.certificate import Certificate, certify
-from antdrive.sim.log.metrics import METRICS, measure
+from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import settings_of
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.log.sights import passed
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import rollout_of
 from antdrive.sim.scenario import Scenario, picture_of, usual_time_limit
@@ -68,6 +68,11 @@ class Run:
         """Whether the robot stopped at the goal in time, certified free of contact."""
         return self.outcome is Outcome.SUCCEEDED and self.certificate is not None and self.certificate.certified
 
+    @functools.cached_property
+    def logged(self) -> LoggedRun | None:
+        """The log with its certificate; None without a log."""
+        return None if self.rollout is None else LoggedRun(self.rollout, self.certificate or certify(self.rollout))
+
     @property
     def metrics(self) -> dict[str, float]:
         """Metrics of the drive by name, as defined in `METRICS`.
@@ -75,7 +80,7 @@ class Run:
         Raises:
             ValueError: the run has no rollout, because planning found no path.
         """
-        return measure(self._driven())
+        return dict(self._driven().metrics)
 
     def metric(self, name: str) -> float:
         """Return one metric of the drive, such as `run.metric("spl")`.
@@ -83,34 +88,20 @@ class Run:
         Raises:
             ValueError: the run has no rollout, because planning found no path; or the metric is unknown.
         """
-        rollout = self._driven()
+        log = self._driven()
         if name not in METRICS:
             raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
-        return METRICS[name](rollout)
+        return METRICS[name](log.rollout)
 
-    def _driven(self) -> Rollout:
-        if self.rollout is None:
+    def _driven(self) -> LoggedRun:
+        if self.logged is None:
             reason = f": {self.reason}" if self.reason else ""
             raise ValueError(f"no rollout: planning ended with {self.outcome.key}{reason}")
-        return self.rollout
+        return self.logged
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, for JSON; `docs/reference/rollout-format.md` lists the keys."""
-        log = self.rollout
-        options = settings_of(self.plan.options) if log is None else log.record.planner.settings
-        return {
-            **self.scenario.as_dict(),
-            **({"options": dict(options)} if options else {}),
-            "cell_m": self.grid.cell,
-            "outcome": self.outcome.key,
-            "sentence": self.outcome.value,
-            "reason": self.reason,
-            "succeeded": self.succeeded,
-            "certificate": self.certificate.as_dict() if self.certificate else None,
-            "metrics": measure(self.rollout) if self.rollout else {"plan_s": self.plan.wall_s},
-            **({"sights": [sight.as_dict() for sight in passed(log)]} if log is not None and len(log.scans) else {}),
-            "digest": self.rollout.digest if self.rollout else None,
-        }
+        return result_of(self)
 
     def __repr__(self) -> str:
         s, log = self.scenario, self.rollout

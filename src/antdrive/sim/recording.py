@@ -24,6 +24,7 @@ from antdrive.sim.log.record import (
 )
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.streams import random_stream
+from antdrive.sim.written import Written
 from antdrive.worlds import Grid, Route, Task
 from antdrive.worlds.world import by_geometry
 
@@ -50,6 +51,7 @@ def rollout_of(
         outcome=log.outcome,
         reason=log.reason,
         physics=log.physics,
+        written=Written.of(s),
         versions=versions(),
         times=TimesRecord(plan_s=answer.wall_s, drive_wall_s=wall, replans_s=tuple(parts.guide.walls)),
     )

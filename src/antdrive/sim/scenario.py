@@ -36,6 +36,7 @@ from antdrive.worlds import Disc, Task, Trajectories, World
 from antdrive.worlds.svg import card, world_svg
 
 DRIFTING = "odometry", "matching"  # localisation without fixes
+KEY_DIGITS = 32  # hexadecimal digits of a key; two of 10^9 runs collide with probability 1e-21
 FINE = 0.05  # largest planning cell without a map [m]
 NO_LIDAR = "has no lidar; add one to its file, or drive jackal or turtlebot4"
 
@@ -78,6 +79,7 @@ class Scenario(Settings):
         robot: the robot's specification
         planner_name: the planner's name in records; empty: its class name
         margin_choice: how the margin was chosen; None: it was given
+        said: the words for task, planner and robot, each with the object that it stood for, which may have been replaced
 
     Raises:
         ValueError: a setting is out of range, or the robot's footprint overlaps an obstacle or a wall at the start.
@@ -88,6 +90,7 @@ class Scenario(Settings):
     robot: RobotSpec
     planner_name: str = ""
     margin_choice: MarginChoice | None = None
+    said: Mapping[str, tuple[Any, Mapping[str, Any]]] = dataclasses.field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -176,32 +179,40 @@ class Scenario(Settings):
             InputError: a world, planner, option or robot is unknown, or a file is invalid.
             ValueError: a setting is out of range, the robot does not fit, or `options` are given for a planner object.
         """
-        from antdrive.planners import load_planner, record_name  # names need the catalogues
-        from antdrive.robots import load_robot
-        from antdrive.worlds import load_task
+        from antdrive.sim.written import Written
 
         if not isinstance(planner, str) and options:
             raise FieldError("options", "need a planner's name; set the options of a planner object itself")
-        return cls(
-            task=world if isinstance(world, Task) else load_task(world),
-            planner=load_planner(planner, **(options or {})) if isinstance(planner, str) else planner,
-            planner_name=record_name(planner) if isinstance(planner, str) else "",
-            robot=robot if isinstance(robot, RobotSpec) else load_robot(robot),
-            **settings,
-        )
+        words: dict[str, Any] = {"options": options or {}}
+        made = dict[str, Any]()
+        for key, name, value in (("world", "task", world), ("planner", "planner", planner), ("robot", "robot", robot)):
+            if isinstance(value, str | os.PathLike):
+                words[key] = os.fspath(value)
+            else:
+                words[key], made[name] = "", value
+        return Written(**words).scenario(**settings, **made)
 
-    def identity(self, *more: object, without: Collection[str] = ()) -> str:
-        """Return the SHA-256 of the drive's inputs and of `more`.
+    def identity(self, **known: Any) -> str:
+        """Return everything that the drive depends on, except its seed, as JSON text.
 
         Args:
-            more: further inputs of the result
-            without: fields to omit
+            known: parts that are known otherwise, such as the hash of the task, and further ones
         """
-        fields = {**{name: getattr(self, name) for name in SETTINGS}, "margin": self.planned_margin}
-        text = identity_text(
-            canonical_hash(self.task), self.planner_label, self.planner, canonical_hash(self.robot), fields, without
-        )
-        return hashlib.sha256(repr((text, *more)).encode()).hexdigest()
+        fields = {name: getattr(self, name) for name in SETTINGS if name != "seed"}
+        fields |= {"margin": self.planned_margin, "perception": self.known_perception}
+        fields |= {name: known.pop(name) for name in fields.keys() & known.keys()}
+        planner: Any = self.planner
+        parts = {
+            "planner": self.planner_label,
+            "options": settings_of(planner) if dataclasses.is_dataclass(planner) else {},
+        }
+        parts |= {name: canonical_hash(getattr(self, name)) for name in ("task", "robot") if name not in known}
+        return json.dumps({**parts, **known, "settings": settings_of(part_of_key(fields))}, sort_keys=True)
+
+    @property
+    def key(self) -> str:
+        """Hash of everything that the drive depends on."""
+        return key_of(self.identity(), self.seed)
 
     @property
     def loss_factors(self) -> LossFactors:
@@ -432,20 +443,9 @@ def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> s
     return world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
 
 
-def identity_text(
-    task: str,  # the canonical hash of the world with start and goal
-    planner: str,  # the planner's name
-    options: Any,  # the planner, or its options as plain values
-    robot: str,  # the robot's canonical hash
-    fields: Mapping[str, Any],  # the values of `SETTINGS` by field
-    without: Collection[str] = (),  # fields to omit
-    **more: str,  # further inputs of the drive
-) -> str:
-    """Return a scenario as JSON text, for hashes."""
-    plain = settings_of(options) if isinstance(options, Mapping) or dataclasses.is_dataclass(options) else {}
-    parts = {"task": task, "planner": planner, "options": plain, "robot": robot, **more}
-    parts["settings"] = settings_of(part_of_key(fields, without))
-    return json.dumps(parts, sort_keys=True)
+def key_of(identity: str, seed: int) -> str:
+    """Return the hash of a scenario's identity and seed: a SHA-256, cut to 32 hexadecimal digits."""
+    return hashlib.sha256(f"{identity}\n{seed}".encode()).hexdigest()[:KEY_DIGITS]
 
 
 def _short(signature: inspect.Signature) -> inspect.Signature:

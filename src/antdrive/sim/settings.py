@@ -9,7 +9,7 @@ import dataclasses
 import math
 import numbers
 import typing
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
@@ -337,9 +337,9 @@ def declared(kind: type[Any]) -> Iterator[DeclaredSetting]:
 SETTINGS: Mapping[str, DeclaredSetting] = MappingProxyType({one.name: one for one in declared(Settings)})
 
 
-def part_of_key(fields: Mapping[str, Any], without: Collection[str] = ()) -> dict[str, Any]:
+def part_of_key(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields that identify a scenario. Fields added later are omitted at their default, so keys stay valid."""
-    known = (one for one in SETTINGS.values() if one.name in fields and one.name not in without)
+    known = (one for one in SETTINGS.values() if one.name in fields)
     return {one.name: fields[one.name] for one in known if one.setting.since == 1 or fields[one.name] != one.default}
 
 

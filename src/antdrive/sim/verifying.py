@@ -11,15 +11,15 @@ from typing import Any
 from antdrive.base.errors import input_error
 from antdrive.base.files import as_json, parse_json, read_bytes
 from antdrive.robots.spec import RobotSpec
-from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.facts import IN_RESULT, LoggedRun, result_of
 from antdrive.sim.log.consistency import wrong_optima
-from antdrive.sim.log.metrics import measure, succeeded
-from antdrive.sim.log.record import DriveRecord, SensingRecord, differences, hashes_of, plain_value, settings_of
+from antdrive.sim.log.record import differences, hashes_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.world import Task
 
 MAX_RESULT_BYTES = 10_000_000  # of a result.json
 SAME = 1e-9  # relative tolerance of numbers that are written twice
+COMPARED = tuple(name for name in IN_RESULT if name not in ("digest", "sights"))  # sights take long
 
 
 def read_result(path: Path) -> Mapping[str, Any]:
@@ -32,75 +32,20 @@ def read_result(path: Path) -> Mapping[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def false_claims(
-    result: Mapping[str, Any],
-    rollout: Rollout,
-    certificate: Certificate,
-    metrics: Mapping[str, float],
-    digest: str,
-) -> Iterator[str]:
+def false_claims(result: Mapping[str, Any], log: LoggedRun) -> Iterator[str]:
     """Yield a sentence for every value in a `result.json` that the log contradicts. Missing keys are no contradiction."""
-    if result.get("digest") != digest:
+    if result.get("digest") != log.rollout.digest:
         yield "result.json: belongs to another log: its digest differs"
         return
     result = json.loads(as_json(result))  # with null for NaN and infinity
-    facts = {**logged_settings(rollout), **_logged_results(rollout, certificate)}
-    for key, logged in facts.items():
-        if key in result and not _agree(result[key], logged):
-            yield f"result.json: {key}: differs from the log, which says {_short(logged)}"
-    for name, inner in (("metrics", metrics), ("settings", _logged_changes(rollout.record))):
-        claimed = result.get(name)
-        if not isinstance(claimed, Mapping):
-            continue
-        for key, logged in json.loads(as_json(inner)).items():
-            if isinstance(logged, Mapping) and isinstance(claimed.get(key), Mapping):
-                logged = {one: logged.get(one) for one in claimed[key]}  # options at their defaults are omitted
-            if key in claimed and not _agree(claimed[key], logged):
-                yield f"result.json: {name}.{key}: differs from the log, which says {_short(logged)}"
-
-
-def logged_settings(rollout: Rollout) -> dict[str, Any]:
-    """Return the log's settings by the keys of `result.json`."""
-    record = rollout.record
-    task = record.task
-    return {
-        "world": task.world.name,
-        "planner": record.planner.name,
-        "robot": record.robot.name,
-        "seed": record.seed,
-        "outcome": record.outcome.key,
-        "options": dict(record.planner.settings),
-        "smoothing": record.smoothing.asked,
-        "noise": record.noise,
-        "margin_m": record.margin,
-        "margin_auto": record.margin_choice is not None,
-        "cell_m": record.cell,
-        "physics_hz": record.physics_hz,
-        "control_hz": record.control_hz,
-        **({"frame": list(task.frame)} if any(task.frame) else {}),
-        "task": plain_value({"start": task.start, "goal": task.goal, "goal_tolerance_m": task.goal_tolerance}),
-    }
-
-
-def _logged_changes(record: DriveRecord) -> dict[str, Any]:
-    """Return the keys of `settings` in `result.json` that the log repeats, without the rules among movers that were asked for."""
-    sensed = record.sensing or SensingRecord(map="given", localisation="fixes", odometry=1.0)
-    return {
-        "controller": record.controller.settings,
-        **settings_of(sensed),
-        "unseen": [[disc.x, disc.y, disc.radius] for disc in record.unseen],
-    }
-
-
-def _logged_results(rollout: Rollout, certificate: Certificate) -> dict[str, Any]:
-    """Return the log's results by the keys of `result.json`."""
-    results: dict[str, Any] = json.loads(as_json(certificate.as_dict()))
-    return {
-        "sentence": rollout.outcome.value,
-        "reason": rollout.record.reason,
-        "succeeded": succeeded(rollout) and certificate.certified,
-        "certificate": results,
-    }
+    for name, value in json.loads(as_json(result_of(log, COMPARED))).items():
+        inside = name in ("metrics", "settings")
+        claimed: Any = result.get(name) if inside else result
+        for key, known in (value if inside else {name: value}).items() if isinstance(claimed, Mapping) else ():
+            if inside and isinstance(known, Mapping) and isinstance(claimed.get(key), Mapping):
+                known = {one: known.get(one) for one in claimed[key]}  # options at their defaults are omitted
+            if key in claimed and not _agree(claimed[key], known):
+                yield f"result.json: {f'{name}.' * inside}{key}: differs from the log, which says {_short(known)}"
 
 
 def _agree(a: Any, b: Any) -> bool:
@@ -143,13 +88,14 @@ def verify_log(
         elsewhere: returns `rerun_fingerprint(log, planner)` of a new process, for the replay; None if that is unknown
     """
     rollout = Rollout.load(log)
-    certificate = certify(rollout)
+    logged = LoggedRun.of(rollout)
+    certificate = logged.certificate
     results = certificate.as_dict()
     problems = [*certificate.problems, *differences(rollout.record, task=task, robot=robot)]
     if task is not None:
         problems += wrong_optima(rollout.record)
     if result is not None and result.exists():
-        problems += false_claims(read_result(result), rollout, certificate, measure(rollout), rollout.digest)
+        problems += false_claims(read_result(result), logged)
     sentence = certificate.sentence
     if replay:
         from antdrive.sim.rerun import replayed

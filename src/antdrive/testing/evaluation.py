@@ -22,7 +22,7 @@ from antdrive.runs.suites.baseline import Baseline, fixed_hashes
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.evaluation import RAISED, Evaluation, changes, evaluate, explain, unmet_demands
 from antdrive.runs.suites.scenarios import run_command, scenario_of
-from antdrive.runs.suites.suite import ScenarioEntry, SuiteCase, load_suite, shown_path
+from antdrive.runs.suites.suite import SuiteCase, load_suite, shown_path
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
 from antdrive.sim.rerun import UNSTEADY, fingerprint, fingerprint_of, is_unsteady
@@ -267,9 +267,10 @@ def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> 
     except FieldError as error:
         outcome, fault, raised = INVALID_INPUT, str(case.error(error.key, error.problem)), error
     except InputError as error:
-        key, mark, problem = str(error).partition(": ")
-        of_the_suite = mark and key in ScenarioEntry.model_fields  # detected during the run, such as a cell too small
-        outcome, fault, raised = INVALID_INPUT, str(case.error(key, problem)) if of_the_suite else str(error), error
+        placed = (
+            case.error(error.key, error.problem) if error.key else error
+        )  # found in the run, such as a cell too small
+        outcome, fault, raised = INVALID_INPUT, str(placed), error
     except Exception as error:  # user planners may raise anything
         outcome, fault, raised = INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}", error
     return _check_of(case, update, results).failed_early(outcome, fault, raised)

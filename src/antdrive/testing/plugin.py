@@ -77,14 +77,13 @@ class DriveSuite(pytest.File):
     def collect(self) -> Iterator[DriveItem]:
         """Yield one item per scenario and seed."""
         from antdrive.base.errors import InputError
-        from antdrive.runs.suites.names import check_names
         from antdrive.runs.suites.suite import load_suite
         from antdrive.testing.unused import unused_of_suite
 
         try:
             cases = load_suite(self.path)
             for case in cases:
-                check_names(case)
+                case.written.check_names(case.suite.parent, case.error)
         except InputError as error:
             raise self.CollectError(str(error)) from None
         self.config.stash[_UNUSED].update(str(path) for path in unused_of_suite(self.path, cases))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import MAX_JSON_BYTES, parse_json, read_bytes
-from antdrive.runs.suites.names import select
+from antdrive.runs.suites.scenarios import select
 from antdrive.runs.suites.suite import BASELINES, SUFFIX, SuiteCase, baseline_folder, load_suite, shown_path
 
 

@@ -8,6 +8,5 @@ from .figures.sight_figure import sight_figure as sight_figure
 from .film.film_options import FilmInfo as FilmInfo
 from .film.video import film as film
 from .film.video import still as still
-from .pages.campaign_report import report_campaign as report_campaign
-from .pages.campaign_report import summarise_campaign as summarise_campaign
-from .pages.run_report import write_report as write_report
+from .pages.report import summarise_campaign as summarise_campaign
+from .pages.report import write_report as write_report

@@ -91,7 +91,8 @@ def default_folder(root: Path) -> Path:
     """Return the folder of a project's results in the user's cache, or a temporary folder if the cache is read-only."""
     name = f"{file_name(root.name or 'root')}-{zlib.crc32(str(root).encode()):08x}"
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
-    for folder in (cache / "antdrive" / "results", Path(tempfile.gettempdir()) / f"antdrive-results-{_user()}"):
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    for folder in (cache / "antdrive" / "results", Path(tempfile.gettempdir()) / f"antdrive-results-{user}"):
         try:
             (folder / name).mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=folder / name).close()
@@ -99,10 +100,6 @@ def default_folder(root: Path) -> Path:
             continue
         return folder / name
     return Path(tempfile.mkdtemp(prefix="antdrive-results-"))
-
-
-def _user() -> str:
-    return str(os.getuid()) if hasattr(os, "getuid") else "user"
 
 
 def write_artefacts(

@@ -12,6 +12,7 @@ from antdrive.base.types import Flags, Floats, Pose
 from antdrive.sim.driving.survey import MAP_CELL, RECENT, horizon_of, reset_ticks, turning_room
 from antdrive.sim.log.rollout import Rollout, estimates_of, ranges_of
 from antdrive.sim.log.sights import lidar_of, meet
+from antdrive.sim.log.timeline import Timeline
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import SKIN
 
@@ -33,7 +34,7 @@ class MapReconstruction:
 
     def __init__(self, rollout: Rollout, *, resets: bool = False, detections: bool = True) -> None:
         self.lidar = lidar_of(rollout).at(rollout.record.control_hz)
-        self._rollout = rollout
+        self._rollout, self._timeline = rollout, Timeline(rollout)
         self._times = rollout.t[rollout.scan_rows]
         self._entered, self._detections = 0, detections
         self.met: Floats = np.full(len(rollout.record.world.obstacles), math.inf)
@@ -73,7 +74,7 @@ class MapReconstruction:
     def _reset(self, at: float) -> None:
         """Reset the map to the latest scans, as the robot did in the same control period, after the scan."""
         record = self._rollout.record
-        here = self._estimate(self._row(at))[:2]
+        here = self._estimate(self._timeline.row(at))[:2]
         self.map = self.map.reset_around(here, turning_room(record.robot.radius), record.task.goal)
         recent = math.ceil(RECENT * self.lidar.rate)
         for k in range(max(0, self._entered - recent), self._entered):
@@ -112,13 +113,9 @@ class MapReconstruction:
         x, y, yaw = poses[row].tolist()
         return x, y, yaw
 
-    def _row(self, at: float) -> int:
-        """Return the last row of the log at or before a time [s]."""
-        return min(max(0, int(np.searchsorted(self._rollout.t, at + 1e-9, side="right")) - 1), len(self._rollout.t) - 1)
-
     def drift(self, at: float) -> Floats:
         """Return the transform from the world to the robot's map (4,): cosine and sine of a rotation, then x and y [m]."""
-        row = self._row(at)
+        row = self._timeline.row(at)
         x, y, turn = relative_frame(self._rollout.pose[[row]], np.array([self._estimate(row)]))[0].tolist()
         return np.array([math.cos(turn), math.sin(turn), x, y])
 

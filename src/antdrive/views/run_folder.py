@@ -49,12 +49,7 @@ def default_folder(scenario: Scenario) -> Path:
     If the folder of that name holds another scenario's run, the fingerprint is added to the name.
     """
     parts = (scenario.task.world.name, scenario.planner_name, scenario.robot.name, str(scenario.seed))
-    return free_folder(Path("out") / "-".join(map(file_name, parts)), "result.json", fingerprint(scenario))
-
-
-def fingerprint(scenario: Scenario, *more: object) -> str:
-    """Return eight hexadecimal digits that identify a scenario."""
-    return scenario.identity(*more)[:8]
+    return free_folder(Path("out") / "-".join(map(file_name, parts)), "result.json", scenario.key[:8])
 
 
 def suffixes(vector: bool) -> tuple[str, ...]:
@@ -120,7 +115,7 @@ def _write_figures(run: Run, folder: Path, kinds: Sequence[str]) -> dict[str, st
 
 def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, Any]:
     """Write a run's `result.json` at `files["result"]` and return its content."""
-    result = {**run.as_dict(), "fingerprint": fingerprint(run.scenario), "files": dict(files), "command": command}
+    result = {**run.as_dict(), "fingerprint": run.scenario.key[:8], "files": dict(files), "command": command}
     write_json(Path(files["result"]), result)
     return result
 

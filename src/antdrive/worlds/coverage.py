@@ -228,13 +228,7 @@ def _middles(
 def _door(world: World, point: npt.NDArray[np.float64], most: float, rooms: tuple[int, int]) -> Door | None:
     """Return the door at a border of two rooms: the narrowest gap around a point of the border.
 
-    None if no empty gap is there: the border ends at other rooms.
-
-    Args:
-        world: the world
-        point: the point [m]
-        most: the largest distance of the gap's obstacles from the point [m]
-        rooms: the rooms' numbers
+    Its obstacles are at most `most` [m] from the point. None if no empty gap is there: the border ends at other rooms.
     """
     discs, (xmin, ymin, xmax, ymax) = world.discs, world.bounds
     x, y = point.tolist()

@@ -15,12 +15,7 @@ from antdrive.worlds.world import World
 
 
 def point_clearance(world: World, points: npt.ArrayLike) -> Floats:
-    """Return the clearance of each point, shape (N,) [m].
-
-    Args:
-        world: the obstacles and walls; movers do not count
-        points: (N, 2) [m]
-    """
+    """Return the clearance of each of `points` (N, 2), shape (N,) [m]; movers do not count."""
     xy = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 2)
     out = np.empty(len(xy))
     _kernels.point_clearances(xy, world.discs, np.asarray(world.bounds, dtype=np.float64), out)
@@ -28,13 +23,7 @@ def point_clearance(world: World, points: npt.ArrayLike) -> Floats:
 
 
 def segment_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike) -> Floats:
-    """Return the clearance of each straight segment, shape (N,) [m].
-
-    Args:
-        world: the obstacles and walls; movers do not count
-        starts: the segments' start points (N, 2) [m]
-        ends: the segments' end points (N, 2) [m]
-    """
+    """Return the clearance of each straight segment from `starts` to `ends` (N, 2), shape (N,) [m]; movers do not count."""
     a = np.ascontiguousarray(starts, dtype=np.float64).reshape(-1, 2)
     b = np.ascontiguousarray(ends, dtype=np.float64).reshape(-1, 2)
     out = np.empty(len(a))
@@ -43,12 +32,7 @@ def segment_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike) 
 
 
 def polyline_clearance(world: World, xy: npt.ArrayLike) -> float:
-    """Return the clearance of a polyline [m].
-
-    Args:
-        world: the obstacles and walls; movers do not count
-        xy: the polyline's points (N, 2), N >= 1 [m]
-    """
+    """Return the clearance of a polyline `xy` (N, 2), N >= 1 [m]; movers do not count."""
     line = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
     if len(line) == 1:
         return float(point_clearance(world, line)[0])

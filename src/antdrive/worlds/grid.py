@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.errors import FieldError, InputError
+from antdrive.base.errors import FieldError, require
 from antdrive.base.types import Floats, Point
 from antdrive.worlds import _kernels, _kernels_turns
 from antdrive.worlds._kernels_turns import HEADINGS, MoveGraph
@@ -119,12 +119,7 @@ class Grid:
         return self.turns.cell[marked].astype(np.int64) if self.turns else marked
 
     def nodes_along(self, start: int, cells: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-        """Return the nodes (N,) of a path along cells; after a move that is not allowed they are undefined.
-
-        Args:
-            start: the path's first node
-            cells: (row, col) of each cell (N, 2)
-        """
+        """Return the nodes (N,) of a path from node `start` along `cells` (N, 2); undefined after a move that is not allowed."""
         flat: npt.NDArray[np.int64] = cells[:, 0].astype(np.int64) * self.shape[1] + cells[:, 1]
         if self.turns:
             steps = np.diff(cells.astype(np.int64), axis=0)
@@ -139,32 +134,20 @@ class Grid:
         return rows, cols
 
     def xy(self, cells: npt.ArrayLike) -> Floats:
-        """Return the centres of cells in world coordinates, shape (N, 2) [m].
+        """Return the centres of `cells` (N, 2), which may be fractional, in world coordinates, shape (N, 2) [m].
 
         Only this method converts (row, col) to (x, y).
-
-        Args:
-            cells: (row, col) of each cell (N, 2); fractional cells are allowed
         """
         rc = np.asarray(cells, dtype=np.float64).reshape(-1, 2)
         return np.asarray(rc[:, ::-1] * self.cell + np.asarray(self.origin))
 
     def fractional(self, xy: npt.ArrayLike) -> Floats:
-        """Return the fractional cells (N, 2) of points: the inverse of `Grid.xy`.
-
-        Args:
-            xy: world coordinates (N, 2) [m]
-        """
+        """Return the fractional cells (N, 2) of points `xy` (N, 2) [m]: the inverse of `Grid.xy`."""
         points = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
         return np.asarray((points - np.asarray(self.origin)) / self.cell)[:, ::-1]
 
     def cell_at(self, x: float, y: float) -> tuple[int, int]:
-        """Return the (row, col) of the cell that contains a point; of the nearest cell for points outside the grid.
-
-        Args:
-            x: world coordinate [m]
-            y: world coordinate [m]
-        """
+        """Return the (row, col) of the cell that contains the point (`x`, `y`) [m], or of the cell nearest to it."""
         rows, cols = self.shape
         row = math.floor((y - self.origin[1]) / self.cell + 0.5)
         col = math.floor((x - self.origin[0]) / self.cell + 0.5)
@@ -226,13 +209,13 @@ def rasterise(world: World, cell: float, inflate: float = 0.0, outline: Outline 
         FieldError: the inflation is negative.
     """
     if not cell > 0:
-        raise InputError(f"cell: must be greater than 0, got {cell:g}")
-    if not inflate >= 0:
-        raise FieldError("inflate", f"must be at least 0, got {inflate:g}")
+        raise FieldError("cell", f"must be greater than 0, got {cell:g}").as_input()
+    require("inflate", inflate, at_least=0)
     width, height = world.size
     rows, cols = (max(1, math.ceil(side / cell - 1e-9)) for side in (height, width))
     if rows * cols > MAX_CELLS:
-        raise InputError(f"cell: {cell:g} m cuts this world into {rows} x {cols} cells; the limit is {MAX_CELLS}")
+        problem = f"{cell:g} m cuts this world into {rows} x {cols} cells; the limit is {MAX_CELLS}"
+        raise FieldError("cell", problem).as_input()
     free = np.empty((rows, cols), dtype=np.bool_)
     closed = np.zeros((rows, cols), dtype=np.uint8)
     x0, y0 = world.bounds[0] + cell / 2, world.bounds[1] + cell / 2

@@ -10,10 +10,11 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias
 
-from antdrive.base.errors import FieldError, require_positive
+from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import format_numbers
+from antdrive.base.records import require_choices
 from antdrive.worlds.limits import MAX_PHASE, MAX_SPEED, MIN_PERIOD
 
 Loop = Literal["pingpong", "teleport", "once"]
@@ -35,8 +36,8 @@ class _Body:
     phase: float = 0.0
 
     def __post_init__(self) -> None:
-        require_positive("radius", self.radius)
-        require_positive("height", self.height)
+        require("radius", self.radius, above=0)
+        require("height", self.height, above=0)
         if not 0 <= self.phase <= MAX_PHASE:
             raise FieldError("phase", f"must be from 0 to {MAX_PHASE:g} s, got {self.phase:g}")
 
@@ -46,9 +47,6 @@ class Keyframed(_Body):
     """A mover with given positions at given times. It stands at the first position until the first keyframe.
 
     Attributes:
-        radius: true radius, never inflated [m], > 0
-        height: height of the cylinder [m], > 0
-        phase: time into the motion at a run's start [s], >= 0
         keyframes: time [s], x [m] and y [m] of each, at least two, in order of time; with equal positions the mover
             stands still
         loop: after the last keyframe the mover goes back and forth ("pingpong"), jumps to the first position
@@ -67,8 +65,7 @@ class Keyframed(_Body):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require_choice("loop", self.loop, Loop)
-        _require_choice("interpolation", self.interpolation, Interpolation)
+        require_choices(self)
         if len(self.keyframes) < 2:
             raise FieldError("keyframes", f"must have at least 2 entries [t, x, y], got {len(self.keyframes)}")
         for i, frame in enumerate(self.keyframes):
@@ -87,9 +84,6 @@ class Cruising(_Body):
     """A mover at constant speed whose surface bounces off the walls.
 
     Attributes:
-        radius: true radius, never inflated [m], > 0
-        height: height of the cylinder [m], > 0
-        phase: time into the motion at a run's start [s], >= 0
         position: initial centre, x and y [m]
         velocity: initial velocity, x and y [m/s]
 
@@ -118,9 +112,6 @@ class Wandering(_Body):
     period.
 
     Attributes:
-        radius: true radius, never inflated [m], > 0
-        height: height of the cylinder [m], > 0
-        phase: time into the motion at a run's start [s], >= 0
         cell: side of the cells of a grid over the world [m]
         period: time for one step, straight or diagonal [s]
         start: a point in the first cell, x and y [m]; None: a random free cell at least 1 m from the robot's start
@@ -137,7 +128,7 @@ class Wandering(_Body):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_positive("walk.cell", self.cell)
+        require("walk.cell", self.cell, above=0)
         if not MIN_PERIOD <= self.period < math.inf:
             raise FieldError("walk.period", f"must be at least {MIN_PERIOD:g} s, got {self.period:g}")
         if math.sqrt(2) * self.cell > MAX_SPEED * self.period:
@@ -211,8 +202,3 @@ def later(mover: Mover, seconds: float) -> Mover:
 
 def _floats(values: tuple[float, float]) -> list[float]:
     return [float(value) for value in values]
-
-
-def _require_choice(key: str, value: str, choices: Any) -> None:
-    if value not in get_args(choices):
-        raise FieldError(key, f"must be one of {', '.join(get_args(choices))}, got {value!r}")

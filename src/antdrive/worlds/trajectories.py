@@ -56,48 +56,28 @@ class Trajectories:
         return len(self.motions)
 
     def positions(self, t: npt.ArrayLike) -> Floats:
-        """Return the movers' centres, shape (T, M, 2) [m].
-
-        Args:
-            t: times (T,), or one time [s]
-        """
+        """Return the movers' centres at times `t` (T,), or at one time [s], shape (T, M, 2) [m]."""
         times = _times(t)
         return _stacked([motion.at(times) for motion in self.motions], (len(times), 0, 2))
 
     def velocities(self, t: npt.ArrayLike) -> Floats:
-        """Return the movers' velocities, right-continuous in time, shape (T, M, 2) [m/s].
-
-        Args:
-            t: times (T,), or one time [s]
-        """
+        """Return the movers' velocities at times `t`, right-continuous in time, shape (T, M, 2) [m/s]."""
         times = _times(t)
         return _stacked([motion.velocities(times) for motion in self.motions], (len(times), 0, 2))
 
     def travel(self, t: npt.ArrayLike) -> Floats:
-        """Return an upper bound on each mover's travel between consecutive times, without jumps, shape (T - 1, M) [m].
-
-        Args:
-            t: times (T,) [s]
-        """
+        """Return an upper bound on each mover's travel between consecutive times `t` (T,), without jumps, (T - 1, M) [m]."""
         times = _times(t)
         return _stacked([np.diff(motion.travelled(times)) for motion in self.motions], (max(0, len(times) - 1), 0))
 
     def jumps(self, t: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Return whether each mover jumps in (t[i], t[i + 1]], shape (T - 1, M).
-
-        Args:
-            t: times (T,) [s]
-        """
+        """Return whether each mover jumps in (t[i], t[i + 1]], for times `t` (T,) [s], shape (T - 1, M)."""
         times = _times(t)
         counts = _stacked([motion.jumped(times) for motion in self.motions], (len(times), 0))
         return np.asarray(np.diff(counts, axis=0) > 0)
 
     def jump_times(self, until: float) -> tuple[Floats, ...]:
-        """Return the times of each mover's jumps, M arrays of shape (J,) [s].
-
-        Args:
-            until: end of the interval [s]
-        """
+        """Return the times of each mover's jumps up to a time `until` [s], M arrays of shape (J,) [s]."""
         return tuple(motion.jump_times(until) for motion in self.motions)
 
 

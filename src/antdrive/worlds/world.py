@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.base.caches import Keyed, bits
-from antdrive.base.errors import FieldError, require_finite, require_positive
+from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import format_disc, format_number, format_numbers, format_point
 from antdrive.base.records import derived
 from antdrive.base.types import Bounds, Floats, Point, Pose
@@ -51,9 +51,9 @@ class Disc:
         ):
             return
         for key in ("x", "y", "radius", "height"):
-            require_finite(key, getattr(self, key))
+            require(key, getattr(self, key))
         for key in ("radius", "height"):
-            require_positive(key, getattr(self, key))
+            require(key, getattr(self, key), above=0)
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class World:
 
     def __post_init__(self) -> None:
         for value in self.bounds:
-            require_finite("bounds", value)
+            require("bounds", value)
         xmin, ymin, xmax, ymax = self.bounds
         if not (xmin < xmax and ymin < ymax):
             raise FieldError(
@@ -94,11 +94,7 @@ class World:
         self._require_short_walks()
 
     def later(self, seconds: float) -> World:
-        """Return the world with all movers' phases advanced.
-
-        Args:
-            seconds: the time to advance [s]
-        """
+        """Return the world with all movers' phases advanced by some `seconds`."""
         return dataclasses.replace(self, movers=tuple(later(mover, seconds) for mover in self.movers))
 
     def _require_room(self, mover: Mover) -> None:
@@ -151,9 +147,7 @@ class World:
     def mover_paths(self, start: Point | None = None, seed: int | None = None) -> list[tuple[Floats, float]]:
         """Return the path over the next 20 s (N, 2) [m] and the radius [m] of each mover, for drawing.
 
-        Args:
-            start: the robot's start [m]
-            seed: the run's random seed; None: wanderers that depend on it are omitted
+        The robot starts at `start` [m]. Without the run's seed, wanderers that depend on it are omitted.
         """
         paths = []
         for i, mover in enumerate(self.movers):
@@ -218,12 +212,12 @@ class Task:
     def __post_init__(self) -> None:
         for key, values in (("start", self.start), ("goal", self.goal), ("frame", self.frame)):
             for value in values:
-                require_finite(key, value)
+                require(key, value)
         for key in ("goal_tolerance", "cell", "time_limit"):
             value = getattr(self, key)
             if value is not None:
-                require_finite(key, value)
-                require_positive(key, value)
+                require(key, value)
+                require(key, value, above=0)
         for key, (x, y) in (("start", self.start[:2]), ("goal", self.goal)):
             self._require_free(key, x, y)
         if self.goal == self.start[:2]:

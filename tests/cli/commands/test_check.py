@@ -53,7 +53,7 @@ def test_a_suite_is_accepted_and_then_passes(antdrive, suite):
     older = suite.parent / "baselines" / "a" / "clear-0.json"
     older.write_text(re.sub(r' *"spl": [\d.]+,\n', "", older.read_text()))
     code, out, _ = antdrive("check", ".", "--jobs", "1", "--only", "clear")
-    assert (code, out.splitlines()[1]) == (0, "  not compared: spl; missing or null in the baseline: renew it")
+    assert (code, out.splitlines()[1]) == (0, "  not compared: spl; the baseline has no value; antdrive accept adds it")
 
 
 def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive, suite):
@@ -119,8 +119,8 @@ def test_a_broken_test_hides_no_other(antdrive, suite, jobs, small_run):
         "schema: 1\ndefaults: {planner: astar, world: small.yaml}\nscenarios:\n"
         "  merged: {}\n"
         "  fine-cells: {cell: 1.0e-9, baseline: false}\n"
-        "  raises: {planner: {file: mine.py, name: Raises}}\n"
-        "  none: {planner: {file: mine.py, name: Wrong}, baseline: false}\n"
+        "  raises: {planner: 'mine.py:Raises'}\n"
+        "  none: {planner: 'mine.py:Wrong', baseline: false}\n"
         "  good: {baseline: false}\n"
     )
     damaged = suite.parent / "baselines" / "a" / "merged-0.json"

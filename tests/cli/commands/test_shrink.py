@@ -64,7 +64,7 @@ def test_a_planner_from_a_file_goes_with_the_suite(antdrive, tmp_path):
     """The planner of the test has its file beside the first suite; the suite of the small failure finds it there."""
     (tmp_path / "own.py").write_text("from antdrive.planners.graph.search import AStar\nclass Mine(AStar):\n    pass\n")
     (tmp_path / "a.drive.yaml").write_text(
-        "schema: 1\nscenarios:\n  hit: {world: empty, planner: {file: own.py, name: Mine}, unseen: [{x: 3, y: 3, radius: 0.2}]}\n"
+        "schema: 1\nscenarios:\n  hit: {world: empty, planner: 'own.py:Mine', unseen: [{x: 3, y: 3, radius: 0.2}]}\n"
     )
     code, out, err = antdrive(
         "shrink", "a.drive.yaml::hit", "--out", "deep/small", "--no-film", "--no-figures", "--jobs", "2", "--json"

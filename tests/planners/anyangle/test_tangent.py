@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from antdrive.planners import AStar, PlanStatus, Query, Tangent, route_along
+from antdrive.planners import AStar, PlanStatus, Query, Tangent, smooth
 from antdrive.planners.anyangle import _kernels_tangent
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath, shortest
 from antdrive.worlds import Disc, Task, World, forest, polyline_clearance, rasterise
@@ -307,7 +307,7 @@ def test_the_path_is_no_longer_than_that_on_the_grid_and_keeps_the_clearance(wor
     ends = query.grid.xy([query.start, query.goal])
     slack = math.dist(ends[0], query.task.start[:2]) + math.dist(ends[1], query.task.goal)
     assert result.length <= AStar().plan(query, RNG).cost + slack
-    route = route_along(result, query.grid, query.task)
+    route = smooth(result, query.grid, query.task, kind="none")
     assert route.length == pytest.approx(result.length, abs=0.02)
 
 
@@ -351,7 +351,7 @@ def test_a_gap_too_narrow_for_the_grid_is_found():
     assert math.isinf(result.cost)
     assert np.abs(np.diff(result.cells, axis=0)).max() == 1
     assert tuple(result.cells[0]) == query.start
-    assert polyline_clearance(task.world, route_along(result, query.grid, task).xy) >= 0.3 - 1e-9
+    assert polyline_clearance(task.world, smooth(result, query.grid, task, kind="none").xy) >= 0.3 - 1e-9
 
 
 def test_a_ring_around_the_goal_has_no_path_with_a_reason():

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from antdrive.planners import AStar, PlanResult, PlanStatus, Query, load_planner, path_cost, route_along
+from antdrive.planners import AStar, PlanResult, PlanStatus, Query, load_planner, path_cost
 from antdrive.planners.anyangle.tangent import Arc, Line, shortest
 from antdrive.planners.smoothing.smooth import SMOOTHINGS, pull_taut, smooth
 from antdrive.robots import load_robot
@@ -268,7 +268,7 @@ def test_every_planners_plans_are_smoothed(name):
         if not plan.solved:
             continue
         solved += 1
-        line = route_along(plan, query.grid, query.task)
+        line = smooth(plan, query.grid, query.task, kind="none")
         longest = max(line.length, plan.cost if math.isfinite(plan.cost) else 0.0)
         taut, wide = (smooth(plan, query.grid, query.task, kind=kind) for kind in SMOOTHED)
         check(taut, line, query.task, query.grid.inflate)
@@ -290,7 +290,7 @@ def test_the_catalogue_is_smoothed_for_both_robots(robot):
             plan = load_planner(name).plan(query, RNG)
             if not plan.solved:
                 continue
-            line = route_along(plan, grid, task)
+            line = smooth(plan, grid, task, kind="none")
             longest = max(line.length, plan.cost if math.isfinite(plan.cost) else 0.0)
             for kind in SMOOTHED:
                 route = smooth(plan, grid, task, kind=kind)
@@ -325,7 +325,7 @@ def test_barn_in_the_best_corridor_is_the_optimum(cell):
         grid = rasterise(task.world, cell, 0.363)
         plan = AStar().plan(Query.between(grid, task), RNG)
         assert plan.solved
-        line = route_along(plan, grid, task)
+        line = smooth(plan, grid, task, kind="none")
         for kind in SMOOTHED:
             route = smooth(plan, grid, task, kind=kind)
             check(route, line, task, 0.363)
@@ -373,7 +373,7 @@ def test_a_plan_that_comes_too_close_is_kept_there_with_a_note():
         route = smooth(plan, grid, task, kind=kind)
         assert "closer than the clearance" in route.note
         assert all((np.abs(route.xy - point) < 1e-9).all(axis=1).any() for point in over[2:4])
-        assert route.length < route_along(plan, grid, task).length
+        assert route.length < smooth(plan, grid, task, kind="none").length
     assert pull_taut(over, task.world.discs, task.world.bounds, 0.3) is None
 
 
@@ -406,7 +406,7 @@ def test_without_room_for_more_clearance_the_line_stays_taut():
 def test_none_is_the_plans_own_line_and_misuse_is_refused():
     task, grid, plan = one_disc(1)
     route = smooth(plan, grid, task, kind="none")
-    assert (route.xy == route_along(plan, grid, task).xy).all()
+    assert (route.xy == smooth(plan, grid, task, kind="none").xy).all()
     assert (route.kind, route.curvature) == ("none", None)
     with pytest.raises(ValueError, match="kind: unknown smoothing 'tight'; choose from none, taut, clearance"):
         smooth(plan, grid, task, kind="tight")

@@ -10,8 +10,8 @@ from antdrive.robots.control._kernels_avoidance import AvoidanceWeights, Encount
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs
 from antdrive.robots.control._kernels_path import PathSamples, clear_lookaheads, project
 from antdrive.robots.control._kernels_pursuit import rotation, slow_for_curvature
-from antdrive.robots.control.speed_limits import speed_profile
 from antdrive.worlds import Disc, Route, World
+from tests.robots.control.profiles import profile
 from tests.robots.control.test_rules import LIMITS, TUNING
 
 WIDE = np.array([-50.0, -50.0, 50.0, 50.0])
@@ -91,9 +91,9 @@ def test_lookaheads_and_braking_keep_their_fractions_of_the_margin(turtlebot):
 
 def test_the_yaw_rate_of_a_profile_turns_the_heading(turtlebot):
     angles = np.linspace(0, 2.0, 200)
-    profile = speed_profile(Route(0.8 * np.stack([np.sin(angles), 1 - np.cos(angles)], axis=1)), turtlebot)
-    turned = np.diff(profile.time) * (profile.yaw_rate[1:] + profile.yaw_rate[:-1]) / 2
-    assert turned.sum() == pytest.approx(profile.heading[-1] - profile.heading[0], rel=0.01)
+    p = profile(Route(0.8 * np.stack([np.sin(angles), 1 - np.cos(angles)], axis=1)), turtlebot)
+    turned = np.diff(p.time) * (p.yaw_rate[1:] + p.yaw_rate[:-1]) / 2
+    assert turned.sum() == pytest.approx(p.heading[-1] - p.heading[0], rel=0.01)
 
 
 def weights(**changes):

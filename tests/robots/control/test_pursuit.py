@@ -12,6 +12,7 @@ from antdrive.robots import LIMITERS, PurePursuit, PursuitState, Twist
 from antdrive.robots.control._kernels_path import clearance_below
 from antdrive.worlds import Disc, Route, World, point_clearance
 from antdrive.worlds._kernels import segment_clearance
+from tests.robots.control.profiles import profile
 
 OPEN = World("open", (-20, -20, 20, 20))
 DT = 1 / 60
@@ -147,11 +148,9 @@ def test_bends_of_known_curvature_are_followed_and_not_cut(radius, speed, jackal
 
 
 def test_a_drive_takes_as_long_as_its_speed_profile_predicts(jackal):
-    from antdrive.robots import speed_profile
-
     route = bends(0.8)
     _, commands, _ = follow(jackal, route, (0, 0, 0))
-    assert len(commands) * DT == pytest.approx(speed_profile(route, jackal, braking=0.7).duration, rel=0.05)
+    assert len(commands) * DT == pytest.approx(profile(route, jackal, braking=0.7).duration, rel=0.05)
 
 
 def test_a_standing_robot_turns_to_the_route_first_and_a_moving_one_does_not_stop_for_it(jackal):

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from antdrive.robots import Noise, PurePursuit, list_robots, load_robot
 from antdrive.robots.control._kernels_profile import samples_along, turning_time
 from antdrive.robots.control.pursuit import indexed_obstacles
-from antdrive.robots.control.speed_limits import speed_profile
 from antdrive.worlds import Route, World, forest, point_clearance
+from tests.robots.control.profiles import profile
 
 
 def straight(length):
@@ -38,7 +38,7 @@ def around(radius, sweep, bulge=5e-4):
 
 def test_speeds_on_a_straight_line_form_a_trapezoid(turtlebot):
     """0.7 m/s at 1 m/s^2: 0.7 s and 0.245 m to accelerate, and the same to brake."""
-    p = speed_profile(straight(2.0), turtlebot, step=0.005)
+    p = profile(straight(2.0), turtlebot, step=0.005)
     assert p.duration == pytest.approx(2.0 / 0.7 + 0.7, abs=1e-4)
     assert p.speed.max() == pytest.approx(0.7)
     assert np.interp(0.125, p.arc, p.speed) == pytest.approx(0.5, abs=1e-3)
@@ -49,18 +49,18 @@ def test_speeds_on_a_straight_line_form_a_trapezoid(turtlebot):
 
 
 def test_speeds_on_a_short_line_form_a_triangle_whose_peak_depends_on_the_braking(turtlebot):
-    p = speed_profile(straight(0.32), turtlebot, step=0.0025)
+    p = profile(straight(0.32), turtlebot, step=0.0025)
     assert p.duration == pytest.approx(2 * math.sqrt(0.32), abs=1e-4)
     assert p.speed.max() == pytest.approx(math.sqrt(0.32), abs=1e-3)
-    soft = speed_profile(straight(0.36), turtlebot, step=0.0025, braking=0.5)  # v^2 = 2 s1 = s2, s1 + s2 = 0.36
+    soft = profile(straight(0.36), turtlebot, step=0.0025, braking=0.5)  # v^2 = 2 s1 = s2, s1 + s2 = 0.36
     assert soft.speed.max() == pytest.approx(math.sqrt(0.24), abs=2e-3)
     assert soft.duration == pytest.approx(math.sqrt(0.24) * 3, abs=1e-3)
-    assert speed_profile(straight(1e-4), turtlebot).duration == pytest.approx(0.02, rel=0.01)
+    assert profile(straight(1e-4), turtlebot).duration == pytest.approx(0.02, rel=0.01)
 
 
 def test_a_long_arc_is_driven_at_the_lowest_of_its_speed_limits(turtlebot, jackal):
     def cruise(robot, radius):
-        p = speed_profile(around(radius, 3.0), robot)
+        p = profile(around(radius, 3.0), robot)
         return float(np.interp(p.arc[-1] / 2, p.arc, p.speed))
 
     assert cruise(jackal, 0.5) == pytest.approx(1.0, rel=1e-3)  # sqrt(2 m/s^2 * 0.5 m)
@@ -73,11 +73,11 @@ def test_a_long_arc_is_driven_at_the_lowest_of_its_speed_limits(turtlebot, jacka
 
 def test_acceleration_on_an_arc_respects_the_yaw_acceleration(jackal):
     sluggish = dataclasses.replace(jackal, max_yaw_acceleration=1.0)
-    p = speed_profile(around(2.0, 2.5), dataclasses.replace(sluggish, max_lateral_acceleration=50.0), blend=0.05)
+    p = profile(around(2.0, 2.5), dataclasses.replace(sluggish, max_lateral_acceleration=50.0), blend=0.05)
     a = np.diff(p.speed**2) / 2 / np.diff(p.arc)
     middle = (p.arc[1:] > 0.5) & (p.arc[1:] < 1.0)
     np.testing.assert_allclose(a[middle], 2.0, rtol=2e-3)  # 1 rad/s^2 at a radius of 2 m is 2 m/s^2
-    tighter = speed_profile(around(1.0, 2.5), dataclasses.replace(sluggish, max_lateral_acceleration=50.0), blend=0.05)
+    tighter = profile(around(1.0, 2.5), dataclasses.replace(sluggish, max_lateral_acceleration=50.0), blend=0.05)
     a = np.diff(tighter.speed**2) / 2 / np.diff(tighter.arc)
     middle = (tighter.arc[1:] > 0.3) & (tighter.arc[1:] < 0.6)
     np.testing.assert_allclose(a[middle], 1.0, rtol=2e-3)
@@ -108,7 +108,7 @@ def test_robots_of_the_catalogue_keep_their_speed_and_lookahead_at_any_noise(nam
 
 def test_at_a_sharp_corner_the_robot_stops_and_rotates_in_place(turtlebot):
     route = Route([[0, 0], [1, 0], [1, 1]])
-    p = speed_profile(route, turtlebot, step=0.005)
+    p = profile(route, turtlebot, step=0.005)
     leg = 1.0 / 0.7 + 0.7
     turn = (math.pi / 2) / 3.14 + 3.14 / 8.0
     assert p.duration == pytest.approx(2 * leg + turn, abs=2e-3)
@@ -119,14 +119,14 @@ def test_at_a_sharp_corner_the_robot_stops_and_rotates_in_place(turtlebot):
     assert not p.speed[at].any()
     assert np.diff(p.time[at])[0] == pytest.approx(turn)
     assert not p.curvature.any()
-    through = speed_profile(route, turtlebot, rotate_in_place_above=2.0)
+    through = profile(route, turtlebot, rotate_in_place_above=2.0)
     assert (through.speed[1:-1] > 0.0).all()
     assert through.duration < p.duration
 
 
 def test_a_slight_corner_is_rounded_within_the_blend(turtlebot):
     route = Route([[0, 0], [2, 0], [2 + math.cos(0.5), math.sin(0.5)]])
-    p = speed_profile(route, turtlebot, blend=0.25, step=0.005)
+    p = profile(route, turtlebot, blend=0.25, step=0.005)
     peak = np.interp(2.0, p.arc, p.curvature)
     assert peak == pytest.approx(0.5 / 0.25, rel=0.03)  # the area of a triangle is the corner's angle
     assert np.interp(2.0 - 0.26, p.arc, p.curvature) == pytest.approx(0.0, abs=1e-9)
@@ -138,7 +138,7 @@ def test_a_slight_corner_is_rounded_within_the_blend(turtlebot):
 def test_the_curvature_of_an_arc_is_exact_and_constant():
     from antdrive.robots.robot_file import load_robot
 
-    p = speed_profile(around(0.44, -2.5), load_robot("jackal"), blend=0.1)
+    p = profile(around(0.44, -2.5), load_robot("jackal"), blend=0.1)
     inner = (p.arc > 0.15) & (p.arc < p.arc[-1] - 0.15)
     np.testing.assert_allclose(p.curvature[inner], -1 / 0.44, rtol=2e-3)
 
@@ -152,7 +152,7 @@ def test_all_limits_hold_on_random_routes(legs, fast_robot):
     for length, turn in legs:
         points.append(points[-1] + length * np.array([math.cos(heading), math.sin(heading)]))
         heading += turn
-    p = speed_profile(Route(np.array(points)), robot)
+    p = profile(Route(np.array(points)), robot)
     check(p, robot)
 
 
@@ -182,24 +182,10 @@ def test_smoothed_routes_respect_the_limits_and_are_faster_than_cell_paths(jacka
         task = forest(np.random.default_rng(seed), count=8, radius=(0.5, 1.5), clearance=1.0)
         grid = rasterise(task.world, 0.25, 0.38)
         plan = AStar().plan(Query.between(grid, task), np.random.default_rng(0))
-        slow, *fast = (
-            speed_profile(smooth(plan, grid, task, kind=kind), jackal) for kind in ("none", "taut", "clearance")
-        )
+        slow, *fast = (profile(smooth(plan, grid, task, kind=kind), jackal) for kind in ("none", "taut", "clearance"))
         for p in fast:
             check(p, jackal)
             assert p.duration < slow.duration
-
-
-def test_settings_out_of_range_are_refused(turtlebot):
-    for wrong in (
-        {"blend": 0.0},
-        {"step": -1.0},
-        {"rotate_in_place_above": math.nan},
-        {"braking": 1.5},
-        {"braking": 0.0},
-    ):
-        with pytest.raises(ValueError, match=next(iter(wrong))):
-            speed_profile(straight(1.0), turtlebot, **wrong)
 
 
 @given(st.integers(0, 10**6), st.floats(0.05, 0.4))
@@ -210,10 +196,10 @@ def test_limits_near_obstacles_are_those_of_the_clearance_among_all_discs(seed, 
     route = Route(rng.uniform((x_min, y_min), (x_max, y_max), (4, 2)))
     at = spacing * np.arange(int(route.length / spacing) + 2)
     points = np.stack([np.interp(at, route.arc, values) for values in route.xy.T], axis=1)
-    profile = np.array([[0.0, route.length], *5 * [[fastest, fastest]]])
+    rows = np.array([[0.0, route.length], *5 * [[fastest, fastest]]])
     obstacles, far = indexed_obstacles(world, 1.0), np.full(len(at), math.inf)
     speed = samples_along(
-        profile, route.xy, route.arc, far, obstacles, spacing, radius, 1.0, 0.5, clearance_time, math.inf
+        rows, route.xy, route.arc, far, obstacles, spacing, radius, 1.0, 0.5, clearance_time, math.inf
     )[0]
     near = 0.5 + np.maximum(point_clearance(world, points) - radius, 0.0) / clearance_time
     assert speed == pytest.approx(np.minimum(fastest, near), abs=1e-9)

@@ -109,11 +109,11 @@ def test_everything_that_a_run_depends_on_changes_its_key_and_names_do_not(tmp_p
 
 def test_the_key_of_a_run_is_the_same_tomorrow():
     (job,) = expand(make_campaign({"worlds": ["empty"], "planners": ["astar"]})).jobs
-    assert "0x" not in job.case.identity, "an address would be another one in the next process"
+    assert "0x" not in job.case.resolved.identity, "an address would be another one in the next process"
     for name in PLANNERS:
         (job,) = expand(make_campaign({"worlds": ["empty"], "planners": [name]})).jobs
-        assert "0x" not in job.case.identity
-        json.loads(job.case.identity)
+        assert "0x" not in job.case.resolved.identity
+        json.loads(job.case.resolved.identity)
 
 
 def test_the_hash_of_a_world_is_the_one_that_logs_are_bound_to():
@@ -433,7 +433,7 @@ def test_runs_with_a_map_have_the_keys_that_they_always_had():
     (said,) = expand(make_campaign({**data, "settings": {"map": "given", "localisation": "fixes"}})).jobs
     (other,) = expand(make_campaign({**data, "settings": {"map": "none"}})).jobs
     assert plain.key == said.key
-    assert not {"map", "localisation", "odometry"} & set(json.loads(plain.case.identity)["settings"])
+    assert not {"map", "localisation", "odometry"} & set(json.loads(plain.case.resolved.identity)["settings"])
     assert other.key != plain.key
 
 
@@ -483,4 +483,4 @@ def test_every_setting_of_the_schema_has_a_meaning():
 )
 def test_planners_under_comparison_drive_their_own_plans_unless_smoothing_is_given(planners, smoothing, driven):
     expansion = expand(make_campaign({"worlds": "empty", "planners": planners, **smoothing}))
-    assert sorted({job.case.settings.fields["smoothing"] for job in expansion.jobs}) == driven
+    assert sorted({job.case.resolved.columns["smoothing"] for job in expansion.jobs}) == driven

@@ -247,7 +247,7 @@ def test_an_auto_margin_is_chosen_once_for_each_robot_and_its_settings(monkeypat
     jobs = calibrated(expand(make_campaign(campaign)).jobs)
     assert sorted(asked) == [("jackal", 0.0), ("jackal", 1.0), ("turtlebot", 0.0), ("turtlebot", 1.0)]
     assert len({one.key for one in jobs}) == len(jobs) == 2 * 2 * 2 * 2 * 2
-    auto = [one for one in jobs if one.case.settings.fields["margin"] == "auto"]
+    auto = [one for one in jobs if one.case.resolved.margin == "auto"]
     assert {one.case.scenario(one.seed).margin for one in auto} == {0.07}
     assert all(one.case.scenario(one.seed).chosen is not None for one in auto)
     assert {sweeping.grid_table([one])["margin"][0].as_py() for one in auto} == {0.07}
@@ -256,7 +256,7 @@ def test_an_auto_margin_is_chosen_once_for_each_robot_and_its_settings(monkeypat
 def test_a_default_margin_is_the_run_with_its_number_and_is_asked_for_as_the_default():
     campaign = {**BASE, "worlds": ["empty"], "robots": ["turtlebot", "jackal"], "noise": [0, 1], "smoothing": ["none"]}
     jobs = expand(make_campaign(campaign)).jobs
-    rows = [(one.case.robot.name, one.case.settings.fields["noise"], *_margins(one)) for one in jobs]
+    rows = [(one.case.robot.name, one.case.resolved.columns["noise"], *_margins(one)) for one in jobs]
     assert sorted(rows) == [
         ("jackal", 0, "default", 0.03), ("jackal", 1, "default", 0.057),
         ("turtlebot", 0, "default", 0.03), ("turtlebot", 1, "default", 0.076),

@@ -13,7 +13,7 @@ from antdrive.runs.suites import Baseline, Demands, load_suite
 from antdrive.runs.suites.demands import Bound
 from antdrive.sim import METRICS, Certificate, DriveRecord, Outcome, Perception, ReplanPolicy, Scenario, run
 from antdrive.sim.log.record import ComponentRecord, settings_of
-from antdrive.sim.rebuild import rebuilt
+from antdrive.sim.written import rebuilt
 from antdrive.worlds import Cruising, Disc, Task, World
 from tests.records import made_up_record
 
@@ -197,7 +197,7 @@ def test_the_name_of_a_class_is_found_too():
     ("controller", "says"),
     [
         (ComponentRecord(name="Mine", settings={}), "record.controller.name: 'Mine' cannot be rebuilt"),
-        (ComponentRecord(name="PurePursuit", settings={"speed": 1.0}), "record.controller.settings.speed: unknown"),
+        (ComponentRecord(name="PurePursuit", settings={"speed": 1.0}), "record.controller.speed: unknown"),
     ],
     ids=lambda value: value.name if isinstance(value, ComponentRecord) else "",
 )

@@ -32,7 +32,6 @@ from antdrive.runs.failures.reproducers import write_reproducers
 from antdrive.runs.failures.shrinker import shrink
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.evaluation import unmet_demands
-from antdrive.runs.suites.scenarios import task_of as scenario_task
 from antdrive.runs.suites.suite import load_suite
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.sim.log.margin import CAUSES
@@ -185,7 +184,7 @@ def test_a_planner_that_raises_is_a_finding(jackal, tmp_path, monkeypatch, metho
     assert small.failure == raised[0].failure
     (handed,) = write_reproducers(Hunt((raised[0],), 4), tmp_path, seconds=0)
     (case,) = load_suite(tmp_path / "failures.drive.yaml")
-    assert handed.small.scenario.task.world.obstacles == scenario_task(case).world.obstacles
+    assert handed.small.scenario.task.world.obstacles == case.written.load_task(case.suite.parent).world.obstacles
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -194,9 +193,11 @@ def test_a_baseline_from_before_a_metric_compares_the_others_and_says_so(small_r
     dataclasses.replace(baseline, metrics=older).save(path)
     evaluation = evaluate(small_run, PLAIN, Baseline.load(path))
     assert evaluation.passed
-    assert evaluation.notes == ("not compared: barn; missing or null in the baseline: renew it",)
+    assert evaluation.notes == ("not compared: barn; the baseline has no value; antdrive accept adds it",)
     hidden = changed(baseline, spl=None, replans=None)
-    assert evaluate(small_run, PLAIN, hidden).notes == ("not compared: spl; missing or null in the baseline: renew it",)
+    assert evaluate(small_run, PLAIN, hidden).notes == (
+        "not compared: spl; the baseline has no value; antdrive accept adds it",
+    )
     assert evaluate(small_run, dataclasses.replace(PLAIN, tolerances={"spl": None}), hidden).notes == ()
     assert evaluate(small_run, PLAIN, baseline).notes == ()
     slow = dataclasses.replace(baseline, metrics={**older, "duration_s": 1.0})
@@ -316,7 +317,9 @@ def test_an_accepted_drive_of_movers_has_movers_in_its_picture(baseline, small_r
 def test_a_way_after_the_baselines_end_is_looked_at_although_it_comes_back(baseline, small_run):
     end, last = baseline.times[-1], small_run.rollout.pose[-1:]
     t = np.append(small_run.rollout.t, end + np.array([1.0, 2.0]))
-    longer = SimpleNamespace(t=t, pose=np.concatenate([small_run.rollout.pose, last + [0.3, 0.4, 0.0], last]))
+    longer = dataclasses.replace(
+        small_run.rollout, t=t, pose=np.concatenate([small_run.rollout.pose, last + [0.3, 0.4, 0.0], last])
+    )
     assert farthest(baseline, longer) == pytest.approx(0.5, abs=2e-3)
     assert farthest(baseline, small_run.rollout) < 2e-3
 

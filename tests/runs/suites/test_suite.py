@@ -16,7 +16,6 @@ from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.margins.choice import Calibration
 from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.suites import Baseline, load_suite, scenario_of, select
-from antdrive.runs.suites.names import check_names
 from antdrive.runs.suites.scenarios import run_command
 from antdrive.runs.suites.suite import ScenarioEntry
 from antdrive.testing import check_case
@@ -82,6 +81,7 @@ def test_a_suite_can_express_every_setting_of_a_scenario():
         "seed": "seeds",
         "planner_name": "planner",
         "margin_choice": "margin",
+        "said": "world",
         "frame": "start",  # suites have places of the world itself
     }
     assert all(keys[field.name] in ScenarioEntry.model_fields for field in fields(Scenario))
@@ -159,7 +159,7 @@ def test_a_random_world_is_that_of_the_command_that_writes_it(tmp_path):
 def test_the_command_of_a_test_has_its_start_and_goal(tmp_path):
     case = only(tmp_path, "world: empty, planner: astar, start: [2, 1.5, -0.1], goal: [3, 4]")
     assert run_command(case) == (
-        "antdrive run empty --planner astar --robot turtlebot --seed 0 --start 2.0,1.5,-0.1 --goal 3.0,4.0"
+        "antdrive run empty --start=2.0,1.5,-0.1 --goal=3.0,4.0 --planner astar --robot turtlebot --seed 0"
     )
 
 
@@ -170,7 +170,8 @@ def test_a_test_drives_a_task_of_its_world(tmp_path):
     case = only(tmp_path, "world: mine.yaml, planner: astar, task: dock, start: [1, 2, 0]")
     task = scenario_of(case).task
     assert (task.start, task.goal) == ((1, 2, 0), (2, 3))
-    assert run_command(case).endswith("--seed 0 --task dock --start 1.0,2.0,0.0")
+    assert run_command(case).startswith("antdrive run")
+    assert " --task=dock --start=1.0,2.0,0.0 --planner" in run_command(case)
     for words, message in (
         ("world: mine.yaml, task: docks", "mine.yaml: no task 'docks'; did you mean dock?"),
         ("world: empty, task: dock", "no task 'dock'; the world has no named tasks"),
@@ -188,22 +189,20 @@ def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path, monkeypat
     path.write_text(text)
     for name in ("Mine", "READY"):
         for words, in_a_file in (
-            (f"{{file: {path.name}, name: {name}}}", True),
-            (f"{{module: {path.stem}, name: {name}}}", False),
             (f"{path.name}:{name}", True),
             (f"{{name: '{path.stem}:{name}'}}", False),
         ):
             case = only(tmp_path, f"world: empty, planner: {words}")
-            check_names(case)
+            case.written.check_names(case.suite.parent, case.error)
             made = scenario_of(case)
             assert type(made.planner).__name__ == "Mine"
             assert made.planner_label == name
             source = path.name if in_a_file else path.stem
-            rest = "--robot turtlebot --seed 0 --smoothing none"
+            rest = "--robot turtlebot --smoothing none --seed 0"
             assert run_command(case) == f"antdrive run empty --planner {source}:{name} {rest}"
             elsewhere = run_command(case, anywhere=True)
             assert elsewhere == f"antdrive run empty --planner {path}:{name} {rest}"
-    installed = only(tmp_path, "world: empty, planner: {module: antdrive.planners, name: AStar}")
+    installed = only(tmp_path, "world: empty, planner: 'antdrive.planners:AStar'")
     assert run_command(installed) == f"antdrive run empty --planner antdrive.planners:AStar {rest}"
     (tmp_path / "pack").mkdir()
     inside = only(tmp_path, "world: empty, planner: 'pack.mine:Mine'")
@@ -236,9 +235,9 @@ WRONG = (
 )  # fmt: skip
 WRONG_BESIDE_A_WORLD = (
     "robot: jakal", "planner: astarr", "planner: {ants: 3}", "planner: {name: aco-han, antss: 3}",
-    "planner: {name: aco-han, ants: many}", "planner: {name: X, file: no.py}", "planner: no.py:X", "planner: math:cosh",
-    "planner: colorsys:X", "planner: {name: 'a:X', file: no.py}", "planner: {name: X, module: no_such_module}",
-    "planner: {name: X, module: colorsys}", "planner: {name: pi, module: math}", "margin: wide", "margin: -1", "noise: 1e99",
+    "planner: {name: aco-han, ants: many}", "planner: no.py:X", "planner: math:cosh",
+    "planner: colorsys:X", "planner: {name: 'no.py:X', ants: 3}", "planner: no_such_module:X", "planner: math:pi",
+    "planner: no.py", "margin: wide", "margin: -1", "noise: 1e99",
     "smoothing: round", "sees: all", "sees: 'positions:x'", "avoid: 1", "replan: never", "replanning: none",
     "perception: positions", "seed: 3", "avoid: {horizn: 1}", "replan: {patience: x}", "controller: {speed: 1}",
     "seeds: []", "seeds: [1, 1]", "seeds: 9-3", "start: [0, 0, 0]", "start: [0, 0]", "expect: {outcome: won}",
@@ -283,11 +282,11 @@ def test_words_select_tests(tmp_path):
 
 def test_a_file_that_ends_the_program_is_a_wrong_suite(tmp_path):
     (tmp_path / "script.py").write_text("import sys\nsys.exit(0)\n")
-    for key, source in (("file", "script.py"), ("module", "script")):
+    for source in ("script.py", "script"):
         with pytest.raises(
-            InputError, match=rf"planner\.{key}: script.*calls exit on import \(exit code 0, script.py:2\); guard"
+            InputError, match=r"planner: script.*calls exit on import \(exit code 0, script.py:2\); guard"
         ):
-            scenario_of(only(tmp_path, f"world: empty, planner: {{{key}: {source}, name: Mine}}"))
+            scenario_of(only(tmp_path, f"world: empty, planner: '{source}:Mine'"))
 
 
 def test_suites_of_different_folders_have_modules_of_their_own(tmp_path):
@@ -302,7 +301,7 @@ def test_suites_of_different_folders_have_modules_of_their_own(tmp_path):
         (tmp_path / folder / "same_name.py").write_text(mine)
     for folder in ("a", "b", "a", "b"):
         place = tmp_path / folder
-        for source in ("{module: same_name, name: Mine}", "{file: same_name.py, name: Mine}", "same_name:Mine"):
+        for source in ("same_name.py:Mine", "same_name:Mine"):
             planner = scenario_of(only(place, f"world: empty, planner: {source}")).planner
             assert planner.of == folder
             assert made.setdefault((folder, source), type(planner)) is type(planner)
@@ -312,7 +311,7 @@ def test_planners_beside_a_suite_stay_in_their_process(tmp_path):
     (tmp_path / "beside_it.py").write_text(
         "from antdrive.planners.graph.search import AStar\nclass Mine(AStar):\n    pass\n"
     )
-    for words in ("{module: beside_it, name: Mine}", "{file: beside_it.py, name: Mine}", "beside_it.py:Mine"):
+    for words in ("beside_it:Mine", "beside_it.py:Mine"):
         assert not is_importable_elsewhere(scenario_of(only(tmp_path, f"world: empty, planner: {words}")).planner)
     assert is_importable_elsewhere(scenario_of(only(tmp_path, "world: empty, planner: astar")).planner)
 
@@ -323,5 +322,5 @@ def test_a_module_that_is_taken_from_elsewhere_is_refused(tmp_path, monkeypatch)
     for place in (elsewhere, tmp_path):
         (place / "taken_name.py").write_text("from antdrive.planners.graph.search import AStar as Mine\n")
     monkeypatch.syspath_prepend(str(elsewhere))
-    with pytest.raises(InputError, match=r"planner\.module: taken_name is imported from .*elsewhere.*beside the suite"):
-        scenario_of(only(tmp_path, "world: empty, planner: {module: taken_name, name: Mine}"))
+    with pytest.raises(InputError, match=r"planner: taken_name is imported from .*elsewhere.*beside the suite"):
+        scenario_of(only(tmp_path, "world: empty, planner: 'taken_name:Mine'"))

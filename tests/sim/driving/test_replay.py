@@ -5,21 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.sim import Scenario, certify, run
-from antdrive.sim.driving.replay import ROUNDING, ReplayCheck, offsets, replay
+from antdrive.sim import run
+from antdrive.sim.driving.replay import ReplayCheck, offsets, replay
 from tests.records import changed
 
 
 def driven(found):
     return found.rollout
-
-
-def test_a_genuine_log_replays_bit_for_bit(small_run):
-    check = replay(driven(small_run))
-    assert check.exact
-    assert check.problems == ()
-    assert (check.position, check.turn, check.twist) == (0.0, 0.0, 0.0)
-    assert check.sentence == "replayed bit for bit"
 
 
 def test_speeds_count_as_poses_do_and_differences_have_no_sign(small_run):
@@ -52,27 +44,6 @@ def test_a_log_with_a_command_for_each_row_replays(small_scenario):
     assert (check.exact, check.problems) == (True, ())
 
 
-def test_a_collided_log_replays_with_the_same_contacts(collided_run):
-    log = driven(collided_run)
-    assert len(log.contacts)
-    assert replay(log).exact
-    assert not replay(replace(log, contacts=log.contacts[1:])).exact
-    assert "contact points" in replay(replace(log, contacts=np.empty((0, 4)))).problems[0]
-
-
-def test_a_noisy_log_replays_from_what_the_motors_were_set_to(small_scenario):
-    log = driven(run(replace(small_scenario, noise=1.0, seed=4)))
-    assert certify(log).certified
-    assert log.actuated.shape == log.command.shape
-    assert replay(log).exact
-    assert replay(replace(log, actuated=np.empty((0, 2)))).position > 0.01
-
-
-@pytest.mark.parametrize("world", ["plaza-moving", "hasan-5f-moving"])
-def test_a_log_among_movers_replays_bit_for_bit(world):
-    assert replay(driven(run(Scenario.of(world, "astar", time_limit=6.0)))).exact
-
-
 def test_a_forged_log_is_far_off(small_run):
     log = driven(small_run)
     world = replace(log.record.task.world, obstacles=())
@@ -89,18 +60,9 @@ def test_rounding_is_a_millimetre(small_run):
         log = driven(small_run)
         pose = log.pose.copy()
         pose[100, 0] += error
-        assert (replay(replace(log, pose=pose)).problems == ()) is fits
-
-
-def test_a_pose_that_is_off_by_more_than_rounding_differs(small_run):
-    log = driven(small_run)
-    pose = log.pose.copy()
-    pose[100, 0] += 2 * ROUNDING
-    assert replay(replace(log, pose=pose)).problems
-    pose[100, 0] -= 1.9 * ROUNDING
-    near = replay(replace(log, pose=pose))
-    assert not near.problems
-    assert not near.exact
+        check = replay(replace(log, pose=pose))
+        assert (check.problems == ()) is fits
+        assert not check.exact
 
 
 @pytest.mark.parametrize(("name", "rows"), [("estimate", slice(400, 401)), ("actuated", slice(401, 405))])

@@ -17,7 +17,7 @@ from antdrive.sim.log.certificate import closed_form_clearance, in_metres
 from antdrive.sim.log.record import DECISION, PerceptionRecord, ReplanRecord
 from antdrive.worlds import Cruising, Disc
 from tests.records import changed
-from tests.sim.log.test_certificate_faults import drive, says, with_record, with_task
+from tests.sim.log.test_certificate_faults import drive, says, with_record
 
 
 @pytest.fixture(scope="module")
@@ -72,35 +72,6 @@ def test_a_log_takes_a_few_distances_for_each_row_unless_it_leaps(log, monkeypat
     assert problem.endswith("a drive takes a few for each row")
 
 
-def test_a_finer_walk_between_the_rows_never_undercuts_the_bound(log):
-    fine = np.linspace(0, len(log.pose) - 1, 20 * len(log.pose))
-    pose = np.stack([np.interp(fine, np.arange(len(log.pose)), np.unwrap(column)) for column in log.pose.T], axis=1)
-    assert closed_form_clearance(replace(log, pose=pose)).min() >= certify(log).bound
-
-
-ROWS = ("t", "pose", "twist", "command", "clearance", "limiter", "movers")
-#: Logs that are none, and what they are told; `test_forgeries.py` forges drives, `test_certificate_faults.py` has every limit.
-NO_LOGS = {
-    "rows missing": (lambda log: replace(log, twist=log.twist[:-1]), "must have the shape"),
-    "time as one number": (lambda log: replace(log, t=np.array(3.0)), "must have the shape"),
-    "no rows": (lambda log: replace(log, **{name: getattr(log, name)[:0] for name in ROWS}), "empty"),
-    "not finite": (lambda log: replace(log, pose=np.full_like(log.pose, np.nan)), "must hold finite numbers"),
-    "bytes for poses": (lambda log: replace(log, pose=log.pose.astype(np.int8)), "must hold float64, found int8"),
-    "a rule of the speed": (lambda log: with_record(log, limiters=("cruise",)), "indices into the 1 of record.limiters"),
-    "the outcome": (lambda log: with_record(log, outcome=Outcome.COLLIDED), "with 0 contacts"),
-    "a smaller robot": (lambda log: changed(log, "record.robot.footprint", rounding=0.17), "closed form says"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("what", NO_LOGS)
-def test_a_changed_log_is_not_certified_even_with_a_new_digest(log, what):
-    forge, words = NO_LOGS[what]
-    edited = forge(log)
-    certificate = certify(with_record(edited, digest=edited.digest))
-    assert not certificate.certified
-    assert any(words in problem for problem in certificate.problems), certificate.problems
-
-
 def test_the_smallest_edit_breaks_the_digest(log, tmp_path):
     saved = Rollout.load(log.save(tmp_path / "run.npz"))
     assert certify(saved).certified
@@ -122,42 +93,6 @@ def test_verify_needs_neither_physics_nor_compiler(log, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert ": certified collision-free: " in done.stdout
-
-
-def test_a_robot_that_stays_where_it_is_gets_a_verdict_of_its_own(log):
-    x, y, _ = log.record.task.start
-    still = {k: np.repeat(getattr(log, k)[:1], 5, axis=0) for k in ROWS} | {"t": np.arange(5) / 240}
-    stays = with_task(replace(log, **still), goal=(x + 0.1, y))
-    stays = replace(stays, route=np.array([[x, y], [x + 0.1, y]]), cells=log.cells[:1])
-    plan = replace(log.record.plan, cost_m=0.0, length_m=0.1, grid_optimum_m=0.0, euclidean_optimum_m=0.1)
-    stays = changed(stays, "record", plan=plan)
-    certificate = certify(stays)
-    assert certificate.certified, certificate.problems
-    assert certificate.sentence.startswith("certified: touched nothing, went nowhere: ")
-    assert certify(log).statement == "certified collision-free"
-    assert certify(log).moved > 1.0
-
-
-@given(st.integers(0, 2**32 - 1), st.floats(0, 3), st.integers(1, 60), st.floats(0.01, 10))
-def test_no_disc_that_is_left_out_is_the_nearest_to_a_footprint(seed, step, count, size):
-    """Whatever the path: the nearest of all discs, by plain distances of points, is among those checked."""
-    rng = np.random.default_rng(seed)
-    discs = np.column_stack([rng.uniform(-size, size, (count, 2)), rng.uniform(0, size / 2, count)])
-    x, y = np.cumsum(rng.normal(0, step, (2, 12)), axis=1)
-    radius = rng.uniform(0, size / 2)
-    ((_, looked_at),) = certificate._blocks(np.column_stack([x, y]), radius, discs)
-    near = {tuple(disc) for disc in looked_at.tolist()}
-    # A footprint of this radius reaches between 0 and `radius` towards a disc: the nearest one is that for some reach.
-    for px, py in zip(x, y, strict=True):
-        apart = np.hypot(discs[:, 0] - px, discs[:, 1] - py) - discs[:, 2]
-        reaches = rng.uniform(0, radius, (40, count))
-        assert {tuple(discs[k]) for k in (apart - reaches).argmin(axis=1)} <= near
-
-
-def test_most_discs_of_a_world_are_left_out():
-    discs = np.array([(x, y, 0.1) for x in range(20) for y in range(20)], dtype=np.float64)
-    ((_, near),) = certificate._blocks(np.array([[5.2, 5.5], [5.4, 5.5]]), 0.2, discs)
-    assert len(near) <= 9
 
 
 PLAIN = drive(0.5, rows=200)

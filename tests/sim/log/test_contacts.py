@@ -164,17 +164,7 @@ def test_the_gap_to_a_disc_is_that_to_the_nearest_point_of_a_dense_outline(foot)
         if nearest > 0.01:  # the centre is outside of the rectangle
             expected = nearest - foot.rounding - radius
             assert _gap(foot, (x, y, yaw), centre, radius) == pytest.approx(expected, abs=3e-3)
-    assert _gap(foot, (1.0, 2.0, 0.7), (1.0, 2.0), 0.1) == pytest.approx(-foot.rounding - 0.1)
-
-
-def test_the_gap_to_a_disc_is_that_to_the_nearest_edge_of_a_polygon():
-    """A square of 0.8 m, 0.1 m ahead of the axle, at any heading."""
-    square = Footprint.polygon([(0.5, -0.4), (0.5, 0.4), (-0.3, 0.4), (-0.3, -0.4)])
-    for yaw in (0.0, 0.7, -2.0):
-        turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-        for place, gap in (((0.9, 0.1), 0.4), ((0.1, -0.7), 0.3), ((-0.6, 0.8), 0.5), ((0.3, 0.0), -0.2)):
-            centre = np.array([1.0, 2.0]) + turn @ place
-            assert _gap(square, (1.0, 2.0, yaw), centre, 0.1) == pytest.approx(gap - 0.1)
+    assert _gap(foot, (1.0, 2.0, 0.7), (1.0, 2.0), 0.1) == pytest.approx(-foot.depth(0.0, 0.0) - 0.1)
 
 
 def test_a_log_tells_its_touches(small_run, collided_run):

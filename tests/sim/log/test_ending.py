@@ -226,16 +226,6 @@ def test_ground_that_avoidance_gave_up_is_no_progress_when_it_is_regained(back, 
         assert list(false_endings(log)) == []
 
 
-def test_periods_are_counted_from_the_end():
-    assert ending._sums_to_end(np.array([True, False, True, True])).tolist() == [3, 2, 2, 1]
-
-
-def test_progress_is_measured_to_the_nearest_point_of_the_route():
-    corner = np.array([(1.0, 1.0), (5.0, 1.0), (5.0, 3.0)])
-    places = np.array([(0.5, 1.0), (2.0, 1.3), (4.9, 1.2), (5.2, 2.5), (5.0, 4.0)])
-    assert ending._arcs(corner, places) == pytest.approx([0.0, 1.0, 4.2, 5.5, 6.0])
-
-
 def test_a_control_period_may_be_one_row():
     log = still(rows=1202, goal=(5.0, 1.0), outcome=Outcome.STUCK)
     assert says(log, "ends within a control period, at row 1201")

@@ -9,10 +9,10 @@ from antdrive.sim import Rollout, certify
 from antdrive.sim.driving.replay import replay
 from antdrive.sim.log.record import PROOFS, MarginRecord, differences
 from antdrive.sim.log.rollout import FORMS
-from benchmarks.forged_fields import ENTRIES, POOL
-from benchmarks.forged_logs import KINDS, LEVELS, Log, digest
-from benchmarks.forgeries import Finding, accepted, all_findings, drawn, forged, found, genuine_drives, more_drives
-from benchmarks.kinds import CROSSED, STILL
+from tests.audit.forged_fields import ENTRIES, POOL
+from tests.audit.forged_logs import KINDS, LEVELS, Log, digest
+from tests.audit.forgeries import Finding, accepted, all_findings, drawn, forged, found, genuine_drives, more_drives
+from tests.audit.kinds import CROSSED, STILL
 from tests.records import COARSE, changed
 
 #: What is said of a forgery, for the checks that nothing else covers: the drive, and words of the sentence.

@@ -10,7 +10,7 @@ import pytest
 from antdrive import Rollout, certify, load_task, run
 from antdrive.sim import Engine, Scenario
 from antdrive.sim.driving.replay import replay
-from antdrive.sim.physics.bodies import BELOW, Bodies
+from antdrive.sim.physics.bodies import BELOW
 from antdrive.sim.physics.bullet import CHASSIS, OBSTACLE
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World
 
@@ -254,28 +254,6 @@ def test_a_planted_fault_is_found(fault, turtlebot):
         plant(engine, engine._bodies)
         engine.step()
         assert words in engine.audit()
-
-
-def test_removed_bodies_of_movers_are_found(jackal, monkeypatch):
-    """PyBullet reuses their numbers, and names wrong ones for the next batch."""
-    park = Bodies.park
-
-    def removing(self, index):
-        if index < 1100:
-            park(self, index)
-        else:
-            body = self.held.pop(index)
-            del self.index[body], self._shapes[body]
-            engine._p.removeBody(body, physicsClientId=engine._client)
-
-    monkeypatch.setattr(Bodies, "park", removing)
-    world = lane(1100, 24, 3)
-    with Engine(world, jackal, trajectories=Trajectories.of(world, (-28.0, 0.0))) as engine:
-        engine.place((-28.0, 0.0, 0.0))
-        engine.command(2.0, 0.0)
-        for _ in range(2400):
-            engine.step()
-        assert engine.audit()
 
 
 OPEN = Task(World("open", (-1, -2, 4, 2), (Disc(2.0, 1.5, 0.1), Disc(2.0, -1.5, 0.1))), (0.0, 0.0, 0.0), (3.0, 0.0))

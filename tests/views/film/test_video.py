@@ -27,7 +27,6 @@ from antdrive.views.film.text import pill, text_width
 from antdrive.views.film.video import film, film_failures, frame_times, render_frames, still
 from antdrive.views.scene import Scene
 from antdrive.worlds import Disc, Task, World, rasterise
-from tests.made_up_drive import undriven
 from tests.records import changed
 
 SIZE = (320, 240)
@@ -218,11 +217,6 @@ def test_a_contact_flashes_and_stays_marked(crash):
     assert redness(final, border) > 0.9
     assert redness(before, mark) < 0.05
     assert redness(final, mark) > 0.15
-
-
-def test_a_drive_without_rows_still_makes_a_picture(drive, tmp_path):
-    info = film(undriven(drive), tmp_path / "nothing.mp4", size=SIZE, fps=10)
-    assert info.frames == 11
 
 
 def test_a_failure_in_the_middle_leaves_no_file(drive, tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -10,9 +11,9 @@ import pytest
 from antdrive.runs.statistics.run_table import RunTable
 from antdrive.views.colour_vision import luminance
 from antdrive.views.colours import label_styles
-from antdrive.views.pages.campaign_report import _styles, campaign_data, write_campaign_report
 from antdrive.views.pages.campaign_summary import summarise
 from antdrive.views.pages.charts import campaign_charts, write_charts
+from antdrive.views.pages.report import Report, report_data
 from tests.runs.made_up_campaign import Skill, made_up_columns
 from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
 
@@ -79,7 +80,7 @@ def summary(columns):
 @pytest.fixture(scope="module")
 def page(summary, tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
-    return write_campaign_report(summary, folder / "a campaign", folder / "page.html")[0]
+    return Report.of(summary, folder / "a campaign").write(folder / "page.html")[0]
 
 
 @pytest.fixture(scope="module")
@@ -147,8 +148,8 @@ def test_nothing_in_the_page_is_fetched_and_no_text_becomes_markup(page):
     assert "http" not in re.sub(r'xmlns(:\w+)?="[^"]*"|"https?://www\.w3\.org[^"]*"', "", text)
 
 
-def test_the_data_come_back_as_they_are(columns):
-    text = campaign_data(RunTable(columns), list(PLANNERS), "x/")
+def test_the_data_come_back_as_they_are(columns, summary, tmp_path):
+    text = report_data(Report("t", summary.table, tmp_path, summary), "x/")
     assert not set("<\u2028") & set(text)
     data = json.loads(text)
     found = {column["name"]: column for column in data["columns"]}
@@ -228,7 +229,7 @@ def test_long_names_of_planners_stay_whole_and_apart(tmp_path):
     assert [title.get_text().replace("\n", " ") for title in titles] == names
     boxes = [title.get_window_extent() for title in titles]
     assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
-    page = write_campaign_report(summary, tmp_path, tmp_path / "page.html")[0].read_text()
+    page = Report.of(summary, tmp_path).write(tmp_path / "page.html")[0].read_text()
     styles = "".join(re.findall(r"<style>(.*?)</style>", page, flags=re.DOTALL))
     assert re.findall(r"([^{}]*){[^{}]*text-overflow", styles) == [" #runs td, #runs th "]
 
@@ -270,14 +271,14 @@ def test_an_own_planner_has_the_same_colour_in_campaigns_as_in_films():
     columns = made_up_columns({"Greedy": Skill(), "astar": Skill()}, worlds=2, seeds=1)
     columns["planner_name"] = ["mine.py:Greedy" if label == "Greedy" else label for label in columns["planner"]]
     summary = summarise(RunTable(columns), title="t")
-    assert _styles(summary) == label_styles(summary.paired.planners)
+    assert Report("t", summary.table, Path(), summary).styles == label_styles(summary.paired.planners)
 
 
 @pytest.mark.slow
 def test_8500_runs_make_a_page_below_10_megabytes(tmp_path):
     planners = {f"planner-{k}": Skill(0.98 - 0.01 * k, 1.0 + 0.02 * k) for k in range(17)}
     summary = summarise(RunTable(made_up_columns(planners, worlds=50, seeds=10)), title="big")
-    page = write_campaign_report(summary, tmp_path, tmp_path / "page.html")[0]
+    page = Report.of(summary, tmp_path).write(tmp_path / "page.html")[0]
     assert len(summary.table) == 8500
     assert page.stat().st_size < 10_000_000
     assert np.isfinite([row.interval.low for row in summary.success]).all()

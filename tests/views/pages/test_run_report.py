@@ -16,9 +16,9 @@ from antdrive.planners import load_planner
 from antdrive.sim import run
 from antdrive.views.figures.run_figures import overview
 from antdrive.views.film.video import film
-from antdrive.views.pages import run_report as reporting
-from antdrive.views.pages.reported_runs import MEASURED, ReportedRun
-from antdrive.views.pages.run_report import EMBEDDED_BYTES, write_report
+from antdrive.views.pages import attachments
+from antdrive.views.pages.attachments import EMBEDDED_BYTES
+from antdrive.views.pages.report import write_report
 from tests.records import changed
 from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
 
@@ -34,7 +34,7 @@ window.onload = async () => {
   const named = (name) => heads.find((h) => h.textContent === name);
   named("planner").click(); found.up = column(1);
   named("planner").click(); found.down = column(1);
-  named("driven [m]").click(); found.driven = column(6);
+  named("driven length [m]").click(); found.driven = column(heads.findIndex((h) => h.textContent === "driven length [m]"));
   const filter = document.querySelector("#filter");
   filter.value = "astar COLLIDED"; filter.dispatchEvent(new Event("input"));
   found.filtered = column(0); found.sections = [...document.querySelectorAll("section.run")].filter((s) => !s.hidden).length;
@@ -104,7 +104,7 @@ def test_in_a_browser_it_sorts_filters_and_plays(filmed, tmp_path, embed):
     assert found["faults"] == []
     assert found["up"] == ["<b>odd</b>", "astar", "mmas"]
     assert found["down"] == found["up"][::-1]
-    assert found["driven"] == ["9.25", "10.50", "100.00"], "as numbers, not as text"
+    assert found["driven"] == ["9.25", "10.5", "100"], "as numbers, not as text"
     assert found["filtered"] == ["made-up"]
     assert found["sections"] == 1
     assert found["nothing"] == "0 of 3 runs"
@@ -120,7 +120,7 @@ def test_on_a_phone_the_page_is_as_wide_as_the_screen(runs, tmp_path):
 
 
 def test_the_page_needs_no_network_and_escapes_its_content(runs, tmp_path):
-    assert write_report(runs, tmp_path / "report.html", title="Ours & theirs") == 3
+    assert write_report(runs, tmp_path / "report.html", title="Ours & theirs").runs == 3
     text = (tmp_path / "report.html").read_text()
     assert "Ours &amp; theirs" in text
     assert "<b>odd</b>" not in text, "what files say is shown, not run"
@@ -133,8 +133,8 @@ def test_the_page_stays_small_by_linking_figures(runs, tmp_path, monkeypatch):
     write_report(runs, tmp_path / "all.html")
     assert (tmp_path / "all.html").stat().st_size < 5_000_000
     assert EMBEDDED_BYTES < 5_000_000
-    one = len(reporting._embedded(runs / "run 0" / "overview.png", "").source)
-    monkeypatch.setattr(reporting, "EMBEDDED_BYTES", 1.5 * one)
+    one = len(attachments.embedded(runs / "run 0" / "overview.png", "").source)
+    monkeypatch.setattr(attachments, "EMBEDDED_BYTES", 1.5 * one)
     write_report(runs, tmp_path / "few.html")
     text = (tmp_path / "few.html").read_text()
     assert text.count("data:image/webp") == 1
@@ -287,8 +287,8 @@ def columns_of(page):
 
 def test_settings_that_differ_between_runs_get_columns(small_scenario, tmp_path):
     write_run(run(small_scenario), tmp_path / "runs" / "a")
-    same = reported(tmp_path / "runs", tmp_path)
-    assert columns_of(same)[1] == ["world", "planner", "outcome", "robot", "seed", *MEASURED]
+    same = columns_of(reported(tmp_path / "runs", tmp_path))[1]
+    assert same[:4] == ["world", "planner", "outcome", "seed"]
     write_run(run(replace(small_scenario, smoothing="none", noise=0.5)), tmp_path / "runs" / "b")
     for name, ants in (("c", 20), ("d", 30)):
         planner = load_planner("as", ants=ants, iterations=3)
@@ -296,9 +296,11 @@ def test_settings_that_differ_between_runs_get_columns(small_scenario, tmp_path)
     (tmp_path / "runs" / "d" / "rollout.npz").unlink()  # a claim shows its settings, too
     text = reported(tmp_path / "runs", tmp_path)
     columns, shown = columns_of(text)
-    assert shown[5:8] == ["options", "smoothing", "noise"], "not the cell: it is the same in all runs"
-    assert [columns[name] for name in shown[5:8]] == [
-        ["", "", "ants 20", "ants 30"], ["clearance", "none", "clearance", "clearance"], [0, 0.5, 0, 0],
+    different = ["smoothing", "noise", "margin", "option.ants"]
+    assert shown == [*same[:2], *different, *same[2:]], "not the cell: it is the same in all runs"
+    assert columns["planner"][2:] == ["as ants=20", "as ants=30"]
+    assert [columns[name] for name in ("option.ants", "smoothing", "noise")] == [
+        [None, None, 20, 30], ["clearance", "none", "clearance", "clearance"], [0, 0.5, 0, 0],
     ]  # fmt: skip
     lines = [line for line in reported(tmp_path / "runs", tmp_path, "md").splitlines() if line.startswith("|")]
     assert len({line.count("|") for line in lines}) == 1
@@ -348,15 +350,15 @@ def test_markdown_puts_failures_first_and_links_films(small_run, collided_run, t
 def test_runs_made_in_python_become_a_report_together_with_folders(small_run, collided_run, tmp_path):
     write_run(small_run, tmp_path / "runs" / "a")
     page = tmp_path / "page.html"
-    assert antdrive.write_report([small_run, collided_run, tmp_path / "runs"], str(page), title="mine") == 3
+    assert antdrive.write_report([small_run, collided_run, tmp_path / "runs"], str(page), title="mine").runs == 3
     text = page.read_text()
     assert "2 / 3" in text
     assert text.count("data:image/webp") == 2
     assert len(set(re.findall(r'<section class="run" id="(run-\d)"', text))) == 3
-    assert antdrive.write_report(small_run, page, figures=False, films=True) == 1
+    assert antdrive.write_report(small_run, page, figures=False, films=True).runs == 1
     assert "data:image" not in page.read_text()
     assert page.read_text().count("data:video/mp4") == 1
-    assert antdrive.write_report(small_run, tmp_path / "page.md") == 1
+    assert antdrive.write_report(small_run, tmp_path / "page.md").runs == 1
     assert "1 / 1" in (tmp_path / "page.md").read_text()
 
 
@@ -379,8 +381,3 @@ def test_a_run_that_a_test_drove_says_why_the_test_failed(small_run, tmp_path, k
     assert text.count("test failed") == (1 if kind == "html" else 4)
     assert "9 s, in the baseline 5 s: 4 s longer" in html.unescape(text).replace("\\", "")
     assert "longer <script>" not in text
-
-
-def test_the_heading_of_a_run_lists_settings_and_not_what_came_of_them():
-    run = ReportedRun(None, {}, None, 0, differing={"map": "none", "explored_m2": "94.7", "options": ""})
-    assert run.heading == {"map": "none"}

@@ -11,10 +11,10 @@ from hypothesis import given
 from antdrive.base.errors import InputError
 from antdrive.runs.statistics.intervals import Interval
 from antdrive.runs.statistics.run_table import RunTable
-from antdrive.views.pages.campaign_report import write_campaign_report
 from antdrive.views.pages.campaign_summary import headline, measure_title, summarise
 from antdrive.views.pages.quotes import disagreements
 from antdrive.views.pages.rendering import percent, percents, probability, short
+from antdrive.views.pages.report import Report
 from antdrive.views.pages.tables import all_cells, latex_text, outcome_cells, pair_cells, success_cells
 from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
 
@@ -27,7 +27,7 @@ def summary():
 
 
 def test_csv_holds_the_numbers_as_they_are(summary, tmp_path):
-    files = write_campaign_report(summary, tmp_path, tmp_path / "t.csv")
+    files = Report.of(summary, tmp_path).write(tmp_path / "t.csv")
     assert [path.name for path in files] == ["t.csv", "t-pairs.csv"]
     rows, pairs = (list(csv.DictReader(path.read_text().splitlines())) for path in files)
     assert [row["planner"] for row in rows] == list(PLANNERS)
@@ -42,7 +42,7 @@ def test_csv_holds_the_numbers_as_they_are(summary, tmp_path):
 
 
 def test_latex_has_as_many_cells_in_each_row_as_columns(summary, tmp_path):
-    text = write_campaign_report(summary, tmp_path, tmp_path / "t.tex")[0].read_text()
+    text = Report.of(summary, tmp_path).write(tmp_path / "t.tex")[0].read_text()
     assert text.count(r"\begin{tabular}") == text.count(r"\end{tabular}") == 6
     assert text.count(r"\toprule") == text.count(r"\midrule") == text.count(r"\bottomrule") == 6
     for block in text.split(r"\begin{tabular}{")[1:]:
@@ -57,15 +57,15 @@ def test_latex_has_as_many_cells_in_each_row_as_columns(summary, tmp_path):
 
 def test_columns_select_tables_and_their_columns_in_order(summary, tmp_path):
     columns = ["planner", "95 % interval", "Share"]
-    text = write_campaign_report(summary, tmp_path, tmp_path / "t.tex", columns)[0].read_text()
+    text = Report.of(summary, tmp_path).write(tmp_path / "t.tex", columns)[0].read_text()
     assert text.count(r"\begin{tabular}{lrr}") == text.count(r"\begin{tabular}") == 1
     assert r"planner & 95 \% interval & share [\%] \\" in text
-    markdown = write_campaign_report(summary, tmp_path, tmp_path / "t.md", columns)[0].read_text()
+    markdown = Report.of(summary, tmp_path).write(tmp_path / "t.md", columns)[0].read_text()
     assert next(line for line in markdown.splitlines() if line.startswith("|")).count("|") == 4
-    (plain,) = write_campaign_report(summary, tmp_path, tmp_path / "t.csv", ["planner", "share"])
+    (plain,) = Report.of(summary, tmp_path).write(tmp_path / "t.csv", ["planner", "share"])
     assert plain.read_text().startswith("planner,share\n")
     with pytest.raises(InputError, match="--columns: no table has planner, colour; choose from planner, share"):
-        write_campaign_report(summary, tmp_path, tmp_path / "t.tex", ["planner", "colour"])
+        Report.of(summary, tmp_path).write(tmp_path / "t.tex", ["planner", "colour"])
 
 
 @given(st.text(alphabet=st.characters(codec="ascii", exclude_categories=["Cc"]), max_size=12))
@@ -98,7 +98,7 @@ def test_markdown_lists_failures_with_their_commands_and_stays_short(tmp_path):
         columns["command"][k] = command
     columns["reason"][failures[0]] = "\x1b]0;title\x07red"
     summary = summarise(RunTable(columns), title="big", metrics=["duration_s"])
-    text = write_campaign_report(summary, tmp_path, tmp_path / "t.md")[0].read_text()
+    text = Report.of(summary, tmp_path).write(tmp_path / "t.md")[0].read_text()
     assert len(text.encode()) < 60_000
     failed = int((~summary.table.success).sum())
     assert f"## Failed runs: {failed}" in text
@@ -118,7 +118,7 @@ def test_notes_state_the_limits_of_the_tables(tmp_path):
     assert any("one world" in note for note in alone.notes)
     assert any("needs two" in note for note in alone.notes)
     for kind in ("md", "tex", "csv", "html"):
-        assert len(write_campaign_report(alone, tmp_path, tmp_path / f"t.{kind}")) == 1
+        assert len(Report.of(alone, tmp_path).write(tmp_path / f"t.{kind}")) == 1
     few = summarise(made_up_runs({"a": Skill(), "b": Skill(seeded=False)}, worlds=3, seeds=3), title="t")
     assert any("3 worlds are too few" in note for note in few.notes)
     assert any("Drives of b do not depend on the seed." in note for note in few.notes)
@@ -165,8 +165,9 @@ def test_outcomes_are_counted_by_planner(summary):
 
 def test_the_headline_favours_no_planner_with_fewer_or_with_more_counted_runs():
     columns = made_up_columns({"A": Skill(1.0), "B": Skill(1.0, seeded=False)}, worlds=10, seeds=2)
-    tied = {words: value for value, words in headline(summarise(RunTable(columns), title="t", metrics=[]))}
-    assert tied["runs succeeded, over all planners"] == "40"
+    summary = summarise(RunTable(columns), title="t", metrics=[])
+    tied = {words: value for value, words in headline(summary.table, summary)}
+    assert tied["reached the goal, certified collision-free"] == "40 / 40"
     (best,) = (words for words in tied if words.startswith("succeeded with"))
     assert best == "succeeded with every planner (95 % over worlds: 72.2 to 100.0)"
     hard = [world >= "world-005" for world in columns["world"]]
@@ -174,7 +175,9 @@ def test_the_headline_favours_no_planner_with_fewer_or_with_more_counted_runs():
     columns["outcome"] = ["no_path" if one else "succeeded" for one in hard]
     kept = [k for k, planner in enumerate(columns["planner"]) if planner == "A" or not hard[k]]
     some = summarise(RunTable({n: [v[k] for k in kept] for n, v in columns.items()}), title="t", metrics=[], size=40)
-    assert [value for value, words in headline(some) if words.startswith("succeeded with every planner")] == ["100.0 %"]
+    assert [
+        value for value, words in headline(some.table, some) if words.startswith("succeeded with every planner")
+    ] == ["100.0 %"]
     assert (
         "Shares are over the 10 instances that every planner ran. Omitted runs of other instances: A 10." in some.notes
     )
@@ -278,6 +281,6 @@ def test_an_interval_and_a_p_that_disagree_are_explained(summary, p, over, holm,
 
 def test_every_report_has_the_sentences(summary, tmp_path):
     for kind in ("md", "tex", "html"):
-        text = write_campaign_report(summary, tmp_path, tmp_path / f"t.{kind}")[0].read_text()
+        text = Report.of(summary, tmp_path).write(tmp_path / f"t.{kind}")[0].read_text()
         assert "permutation test over worlds" in text
     assert summary.as_dict()["sentences"] == summary.sentences

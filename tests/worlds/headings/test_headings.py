@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from antdrive.worlds import DIRECTIONS
-from antdrive.worlds.headings import Outline, free_headings, sweep_clearance, turn_clear
+from antdrive.worlds.headings import Outline, sweep_clearance, turn_clear
 from antdrive.worlds.headings._kernels_headings import clear_moves, heading_bits
+from tests.worlds.headings.intervals import TURN, free_headings
 from tests.worlds.headings.oracle import BAND, OUTLINES, crowd, gap, outlines, sampled
 
-TURN = 2 * math.pi
 EVERY = pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
 NONE = np.zeros((0, 3))
 SQUARE = OUTLINES["rectangle"]

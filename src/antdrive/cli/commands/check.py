@@ -88,7 +88,7 @@ def drive_tests(
     results = Results(folder or default_folder(Path.cwd()), cast("Films", film))
     outcomes, unused = drive_python_tests([w for w in words if is_module(w) or Path(w).is_dir()], only, update, results)
     for result in () if json else outcomes:
-        _print(result)
+        _print(result, set())
     suites = [word for word in words if not is_module(word)]
     if outcomes:
         suites = [word for word in suites if not Path(word).is_dir() or any(Path(word).rglob(f"*{SUFFIX}"))]
@@ -108,25 +108,27 @@ def drive_suites(
 
     cases = select(suites, only)
     for case in cases:
-        if case.given.get("margin") == "auto":  # calibrate once, with a bar, before processes start
+        if case.written.settings.get("margin") == "auto":  # calibrate once, with a bar, before processes start
             with suppress(InputError, FieldError):  # reported as the test's failure
                 scenario_of(case, with_chosen_margin)
     processes = min(jobs or cores(), len(cases))
-    outcomes = []
+    outcomes, noted = [], set[str]()
     with bar("driving") as progress:
         for result in check_cases(cases, jobs=processes, update=update, results=results):
             outcomes.append(result)
             if not json:
-                _print(result)
+                _print(result, noted)
             progress(len(outcomes) / len(cases))
     return outcomes
 
 
-def _print(result: "CheckResult") -> None:
-    """Print the result of one test."""
+def _print(result: "CheckResult", noted: set[str]) -> None:
+    """Print the result of one test, without notes that were `noted` beside a test before."""
     words = (result.accepted or "passed") if result.passed else "FAILED"
     print_line(marked(result.passed, f"{result.address}: {words}"))
-    for line in (*result.gains, *result.notes) if result.passed else result.message.splitlines():
+    notes = [note for note in result.notes if note not in noted]
+    noted.update(notes)
+    for line in (*result.gains, *notes) if result.passed else result.message.splitlines():
         print_line(f"  {line}")
 
 

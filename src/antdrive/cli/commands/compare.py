@@ -14,7 +14,7 @@ from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, campaign_folders, compare_campaigns
 from antdrive.cli.console import file_lines, marked, planning, print_error, print_traceback, show
-from antdrive.cli.entrants import check_worlds, entrants_of, repeat_command
+from antdrive.cli.entrants import check_worlds, entrants_of
 from antdrive.cli.exits import FAILED, SUCCEEDED
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives, print_faults, print_idle_settings, results_folder
@@ -25,8 +25,8 @@ from antdrive.runs.comparing import (
     Comparison,
     compare_scenarios,
     difference_cells,
-    mark_of,
 )
+from antdrive.runs.results_folder import mark_of
 from antdrive.sim.settings import COMPARED_SMOOTHING
 from antdrive.views.run_folder import check_film, check_folder, write_run
 
@@ -81,6 +81,7 @@ def compare(
     """
     from antdrive.planners import PlannerError, capabilities_of
     from antdrive.sim.pipeline import run
+    from antdrive.sim.written import Written
 
     if campaigns := campaign_folders(worlds, context, query):
         compare_campaigns(campaigns, planner or (), query, json)
@@ -106,10 +107,10 @@ def compare(
     print_idle_settings(list(scenarios.values()), {"seed"} if seeds > 1 else ())
     numbers = range(given["seed"], given["seed"] + seeds)
     cases = [(names[world], number) for world in worlds for number in numbers]
-    mark = mark_of({f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}, cases)
+    keys = [(entrant.label, world, scenario.key) for (world, entrant), scenario in scenarios.items()]
+    mark = mark_of(keys, cases)
     usual = Path("out") / file_name(f"compare-{'-'.join(names.values())}"[:100])
     with results_folder(out, usual, MARKER, mark, write_manifest=False) as (folder, facts):
-        of, words = {entrant.label: entrant for entrant in entrants}, {name: world for world, name in names.items()}
 
         def attempt(label: str, scenario: "Scenario") -> "tuple[Run | PlannerError, str | None]":
             """Drive with a progress bar, and write the run."""
@@ -126,7 +127,7 @@ def compare(
             if isinstance(result, PlannerError):
                 print_traceback(result)
                 return result, None
-            command = repeat_command(scenario, of[label], words[case[0]], robot, ends.words)
+            command = Written.of(scenario).command() or ""
             write_run(result, part, command, figures=figures and case == cases[0])
             return result, str(part)
 

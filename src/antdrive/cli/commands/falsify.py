@@ -13,7 +13,8 @@ from antdrive.cli.console import bar, show
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, results_folder
 from antdrive.cli.scenario_options import Setup
-from antdrive.views.run_folder import RUN_FILES, fingerprint, write_result, write_run
+from antdrive.runs.results_folder import mark_of
+from antdrive.views.run_folder import RUN_FILES, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.hunt import Hunt
@@ -45,13 +46,13 @@ def falsify(
     Every world has a path. Failures are repeated in another process, shrunk, and written as a suite with films.
     Ctrl-C ends the search and keeps the failures found so far. Exit code 0: no failure. Exit code 1: at least one failure.
     """
-    from antdrive.planners.user_code import is_user_code
     from antdrive.runs.failures.hunt import check_method, find_failures
+    from antdrive.sim.written import Written
 
     check_method(method)
     seed = given.pop("seed")
-    scenario = setup.scenario("empty", given)
-    mark = fingerprint(scenario, budget, seed, method, obstacles, seconds)
+    scenario = setup.scenario(Written(world="empty"), given)
+    mark = mark_of(scenario.key, budget, seed, method, obstacles, seconds)
     usual = Path("out") / file_name(f"falsify-{setup.planner}-{scenario.robot.name}-{seed}")
     search: dict[str, Any] = {"budget": budget, "seed": seed, "method": method}
     with results_folder(out, usual, MARKER, mark) as (folder, _):
@@ -59,7 +60,7 @@ def falsify(
             hunt = find_failures(
                 scenario, obstacles=obstacles, progress=lambda runs, failures: progress(runs / budget), **search
             )
-        reported = _report(hunt, folder, setup.planner if is_user_code(setup.planner) else None, seconds, film)
+        reported = _report(hunt, folder, seconds, film)
     facts = {
         "planner": scenario.planner_label,
         "robot": scenario.robot.name,
@@ -76,14 +77,14 @@ def falsify(
     return not hunt.findings
 
 
-def _report(hunt: "Hunt", folder: Path, planner: str | None, seconds: float, film: bool) -> "list[Reproducer]":
+def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reproducer]":
     """Shrink, repeat and write each distinct failure, replacing those of an earlier search."""
     from antdrive.runs.failures.reproducers import SUITE, write_reproducers
 
     reported = []
     if hunt.findings:
         with bar("shrinking") as progress:
-            reported = write_reproducers(hunt, folder, planner=planner, seconds=seconds, progress=progress)
+            reported = write_reproducers(hunt, folder, seconds=seconds, progress=progress)
     else:
         (folder / SUITE).unlink(missing_ok=True)
     for place in folder.glob("failure-*/"):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from antdrive.runs.margins.choice import MarginResult
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
-    from antdrive.worlds import Task
+    from antdrive.sim.written import Written
 
 ASTAR = Setup(planner="astar")
 
@@ -78,15 +78,15 @@ def find_margin(
     return smallest is not None
 
 
-def _chosen(world: str | None, kind: str | None, ends: Ends) -> "str | Task":
+def _chosen(world: str | None, kind: str | None, ends: Ends) -> "Written":
     """Return the world of every drive, or a placeholder for random worlds."""
     if (world is None) == (kind is None):
         raise InputError("find-margin: name either a world or --generate forest|barn")
     if world is not None:
         return ends.of(world)
-    if ends.words:
+    if ends != Ends():
         raise InputError("--task, --start, --goal: need a WORLD; random worlds have their own starts and goals")
-    return "empty"
+    return ends.of("empty")
 
 
 def _lines(base: "Scenario", trials: "Sequence[MarginResult]", smallest: float | None) -> Iterator[str]:

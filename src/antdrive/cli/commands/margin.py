@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 def margin(rollout: options.Log, json: options.Json = False) -> None:
     """Break down a drive's safety margin by cause.
 
-    Plans keep the margin free around the robot's disc, or its footprint. The table shows how much of it the drive used, where,
-    and why: rounding, corner cutting, tracking, heading, slip or localisation. For a margin of --margin auto, it also compares
+    Plans keep the margin free around the robot's disc, or its footprint. Only standing obstacles that they know count. The
+    table shows how much of it the drive used, where, and why: rounding, corner cutting, tracking, heading, slip or
+    localisation. For a margin of --margin auto, it also compares
     the predicted loss with the actual loss; a margin that is the default is called so.
 
     "Used at most" is the maximum that a cause used anywhere in the drive. "At the tightest place" splits the loss at the
@@ -38,7 +39,8 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
         )
         for share in spent.contributions
     )
-    shape = log.record.shape
+    record, shape = log.record, log.record.shape
+    others = [name for name, there in (("movers", record.world.movers), ("unseen obstacles", record.unseen)) if there]
     lines = [
         f"{rollout}: margin {spent.margin:.3f} m, smallest clearance of the robot's {shape} {spent.left:.4f} m at {place}",
         *table(("cause", "used at most m", "at", "at the tightest place m"), rows),
@@ -46,8 +48,9 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
         if spent.largest.metres
         else "no loss: the robot never came closer to an obstacle than the margin",
     ]
-    if has_default(log.record):
-        record = log.record
+    if others:
+        lines.append(f"standing obstacles of the map alone: {' and '.join(others)} do not count")
+    if has_default(record):
         lines.append(f"the margin is the default for noise {record.noise:g}, smoothing {record.smoothing.asked}")
     if prediction is not None:
         loss = prediction["footprint_loss_m"]

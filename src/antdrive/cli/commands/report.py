@@ -1,14 +1,16 @@
 """`antdrive report`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import format_size
 from antdrive.cli import options
-from antdrive.cli.campaign_tables import CampaignQuery, is_campaign, refuse_campaign_options, report_campaigns
+from antdrive.cli.campaign_tables import CampaignQuery, is_campaign, refuse_campaign_options
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import argument, flag, option
+
+PRINTED = (".pdf", ".svg")  # suffixes of charts
 
 
 @options.with_settings()
@@ -41,22 +43,25 @@ def report(
         raise InputError("give -o FILE, --figures DIR, or both")
     named = [name.strip() for name in columns.split(",") if name.strip()] if columns else []
     campaigns = [folder for folder in folders if is_campaign(folder)]
-    if campaigns and len(campaigns) == len(folders):
-        report_campaigns(folders, out, json, query, figures, title=title, planners=planner or (), columns=named)
-        return
-    other = next(folder for folder in folders if folder not in campaigns)
-    if campaigns:
-        raise InputError(f"{other}: is not a campaign folder, but {campaigns[0]} is; write separate reports")
-    refuse_campaign_options([*(["planner"] if planner else []), *(["columns"] if named else []), *query.given], other)
-    from antdrive.views.pages.run_report import write_report, write_run_figures
+    asked: dict[str, Any] = {}
+    if len(campaigns) == len(folders):
+        asked = {"planners": planner or (), "columns": named, **query.arguments}
+    else:
+        other = next(folder for folder in folders if folder not in campaigns)
+        if campaigns:
+            raise InputError(f"{other}: is not a campaign folder, but {campaigns[0]} is; write separate reports")
+        given = [*(["planner"] if planner else []), *(["columns"] if named else []), *query.given]
+        refuse_campaign_options(given, other)
+    from antdrive.views.pages.report import write_report
 
-    facts: dict[str, object] = {}
-    lines: list[str] = []
-    if out is not None:
-        count = write_report(folders, out, title=title, embed_films=embed_films)
-        facts = {"file": str(out), "runs": count, "bytes": out.stat().st_size}
-        lines = [f"{count} runs, {format_size(out.stat().st_size)}", *file_lines({"report": out})]
-    if figures is not None:
-        facts["figures"] = [str(path) for path in write_run_figures(folders, figures)]
-        lines += file_lines({"figures": figures})
-    show(json, facts, lines)
+    written = write_report(folders, out, title=title, charts=figures, embed_films=embed_films, **asked)
+    count, files, size = written.runs, written.files, sum(path.stat().st_size for path in written.files)
+    names = dict(zip(("report", "pairs"), (path for path in files if path.suffix not in PRINTED), strict=False))
+    show(
+        json,
+        {"file": str(files[0]), "files": [str(path) for path in files], "runs": count, "bytes": size},
+        [
+            f"{f'{count} run' + 's' * (count != 1) + ', ' if count else ''}{format_size(size)}",
+            *file_lines({**names, **({} if figures is None else {"figures": figures})}),
+        ],
+    )

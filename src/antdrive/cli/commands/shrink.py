@@ -12,7 +12,8 @@ from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import film_drives, results_folder
 from antdrive.cli.parse import log_at
 from antdrive.cli.scenario_options import with_chosen_margin
-from antdrive.views.run_folder import fingerprint, write_result, write_run
+from antdrive.runs.results_folder import mark_of
+from antdrive.views.run_folder import write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.shrinker import Shrunk
@@ -50,7 +51,7 @@ def shrink(
     scenario, the log and a film. Exit code 0: the result fails in the same way in another process.
     """
     from antdrive.runs.failures.failure import parse_bound
-    from antdrive.runs.failures.handover import planner_beside, scenario_name
+    from antdrive.runs.failures.handover import scenario_name
     from antdrive.runs.failures.reproducers import write_reproducer
     from antdrive.runs.failures.shrinker import shrink as make_small
 
@@ -59,13 +60,12 @@ def shrink(
     scenario, case = _of_a_test(failure) if "::" in failure else (_of_a_log(failure, planner), None)
     crossed = parse_bound(bound) if bound is not None else _broken_bound(case, scenario)
     name = f"{scenario_name(scenario.task.world.name)}-small"
-    mark = fingerprint(scenario, str(crossed))
+    mark = mark_of(scenario.key, str(crossed))
     with results_folder(out, Path("out") / name, MARKER, mark) as (folder, _):
         with working("shrinking") as progress:
             journal = folder / "journal.json"
             shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
-        words = planner_beside(case, planner, scenario, folder)
-        small, suite, repeats = write_reproducer(shrunk, name, folder, bound=crossed, planner=words)
+        small, suite, repeats = write_reproducer(shrunk, name, folder, bound=crossed)
         files = {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
         report: dict[str, Any] = {"files": files}
         if small.run is not None:  # else the planner raises an error
@@ -87,8 +87,7 @@ def shrink(
 
 def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
     """Return the scenario of a suite's test, and the test."""
-    from antdrive.runs.suites.names import select
-    from antdrive.runs.suites.scenarios import scenario_of
+    from antdrive.runs.suites.scenarios import scenario_of, select
 
     cases = select([words])
     if len(cases) > 1:
@@ -111,7 +110,7 @@ def _of_a_log(words: str, planner: str | None) -> "Scenario":
     from antdrive.base.errors import input_error
     from antdrive.runs.suites.suite import SUFFIX
     from antdrive.sim.log.rollout import read_record
-    from antdrive.sim.rebuild import rebuilt
+    from antdrive.sim.written import rebuilt
 
     if words.endswith(SUFFIX):
         raise InputError(f"{words}: is a suite; name one of its tests: {words}::SCENARIO")

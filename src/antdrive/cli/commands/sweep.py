@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 from antdrive.base.errors import InputError
+from antdrive.base.files import known_suffix
 from antdrive.base.tables import table
 from antdrive.cli import options
 from antdrive.cli.campaign_options import campaign_from
@@ -110,9 +111,9 @@ def sweep(
         results = make_runs(requested, out, expansion=expansion, progress=progress, notify=print_error, **rest)
     files: list[str] = []
     if report is not None:
-        from antdrive.views.pages.campaign_report import report_campaign
+        from antdrive.views.pages.report import write_report
 
-        files = [str(path) for path in report_campaign(out, report)]
+        files = [str(path) for path in write_report(out, report).files]
     facts = {
         "folder": str(results.folder),
         "table": str(results.path),
@@ -130,9 +131,9 @@ def sweep(
 def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
     """Raise an error about options without effect."""
     if report is not None:
-        from antdrive.views.pages.campaign_report import check_suffix
+        from antdrive.views.pages.report import SUFFIXES
 
-        check_suffix(report)
+        known_suffix(report, SUFFIXES)
         if dry_run:
             raise InputError("--report: has no effect with --dry-run; omit one")
     from antdrive.runs.campaigns.running import Keep as Kinds
@@ -150,7 +151,7 @@ def _size_lines(expansion: "Expansion", missing: int) -> Iterator[str]:
         plural = count != 1 or " " in name or name == "settings"
         return f"{count} {name if plural else name.removesuffix('s')}"
 
-    smoothings = dict.fromkeys(str(job.case.settings.fields["smoothing"]) for job in expansion.jobs)
+    smoothings = dict.fromkeys(str(job.case.resolved.columns["smoothing"]) for job in expansion.jobs)
     values = {"smoothing": f"smoothing {', '.join(smoothings)}"}
     yield " x ".join(values.get(name) or counted(name, count) for name, count in expansion.counts.items())
     omitted = f"; {expansion.duplicates} duplicate combinations omitted" if expansion.duplicates else ""

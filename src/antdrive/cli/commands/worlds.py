@@ -56,7 +56,7 @@ def show_world(
     if given["margin"] == "auto":
         raise InputError("--margin auto: applies to drives only; give a number of metres")
     with stage("planning with astar"):
-        found = fit(ends.of(world), robot, **given)
+        found = fit(ends.task_of(world), robot, **given)
     if out is not None:
         from antdrive.views.figures.plan_figures import plan_figure
 

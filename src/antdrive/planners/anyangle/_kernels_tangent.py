@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from antdrive.planners.graph._kernels_heap import STATE, drop_first, push
 from antdrive.worlds._kernels import (
     Array,
     count_below,
@@ -113,18 +114,6 @@ class Lines(NamedTuple):
 
     values: Array
     marks: Array
-
-
-class Heap(NamedTuple):
-    """A binary heap of lines by length; entries beyond its size are unused.
-
-    Attributes:
-        key: lower bound of the length of a path through each line [m]
-        line: the lines
-    """
-
-    key: Array
-    line: Array
 
 
 @inline
@@ -526,40 +515,6 @@ def blocked_by(
     return -1
 
 
-@kernel
-def push(heap: Heap, size: int, key: float, line: int) -> int:
-    """Push a line onto a heap with free capacity; returns the new size."""
-    at = size
-    while at > 0:
-        up = (at - 1) >> 1
-        if heap.key[up] <= key:
-            break
-        heap.key[at], heap.line[at] = heap.key[up], heap.line[up]
-        at = up
-    heap.key[at], heap.line[at] = key, line
-    return size + 1
-
-
-@kernel
-def drop_first(heap: Heap, size: int) -> int:
-    """Remove the first line from a heap; returns the new size."""
-    size -= 1
-    key, line = heap.key[size], heap.line[size]
-    at = 0
-    while True:
-        down = 2 * at + 1
-        if down >= size:
-            break
-        if down + 1 < size and heap.key[down + 1] < heap.key[down]:
-            down += 1
-        if heap.key[down] >= key:
-            break
-        heap.key[at], heap.line[at] = heap.key[down], heap.line[down]
-        at = down
-    heap.key[at], heap.line[at] = key, line
-    return size
-
-
 @inline
 def least_by(ends: Array, least: float, ax: float, ay: float, bx: float, by: float, length: float) -> float:
     """Return a lower bound of every undiscovered path through the line from a to b.
@@ -650,9 +605,9 @@ def add_tangents(
 
 @kernel
 def relax(
-    obstacles: Obstacles, ends: Array, line: int, lines: Lines, first: int, last: int, heap: Heap, waiting: int
-) -> int:
-    """Extend the path ending in `line` by lines `first` to `last`, which leave its disc; returns the heap's new size."""
+    obstacles: Obstacles, ends: Array, line: int, lines: Lines, first: int, last: int, heap: Array, waiting: int
+) -> tuple[Array, int]:
+    """Extend the path ending in `line` by lines `first` to `last`, which leave its disc; returns the open list and its size."""
     g, r = 0.0, 0.0
     if line >= 0:
         g, r = lines.values[line, BEST], obstacles.discs[lines.marks[line, DISC], 2]
@@ -674,19 +629,20 @@ def relax(
             lines.values[e, BEST] = length
             lines.marks[e, BEFORE] = line
             to_goal = math.hypot(ends[1, 0] - lines.values[e, ENDS + 2], ends[1, 1] - lines.values[e, ENDS + 3])
-            waiting = push(heap, waiting, length + to_goal, e)
-    return waiting
+            heap = push(heap, waiting, length + to_goal, 0.0, e)
+            waiting += 1
+    return heap, waiting
 
 
 @kernel
-def next_line(obstacles: Obstacles, lines: Lines, latest: Array, heap: Heap, waiting: int) -> tuple[int, int]:
-    """Return the most promising line to expand, -1 if there is none, and the heap's new size.
+def next_line(obstacles: Obstacles, lines: Lines, latest: Array, heap: Array, waiting: int) -> tuple[int, int]:
+    """Return the most promising line to expand, -1 if there is none, and the open list's new size.
 
     A line is skipped if an earlier expanded line reaches the same point of the rim by a path at most as long.
     Expanded lines form a linked list per arc and turn, from `latest` (2 A,) on by EARLIER.
     """
     while waiting > 0:
-        e = heap.line[0]
+        e = int(heap[0, STATE])
         waiting = drop_first(heap, waiting)
         if lines.marks[e, DONE]:
             continue
@@ -760,7 +716,7 @@ def shortest_path(discs: Array, bounds: Array, ends: Array, limit: float) -> tup
     lines = Lines(np.empty((rows, 8), dtype=np.float64), np.empty((rows, 7), dtype=np.int64))
     span = np.full((2 * n + 1, 2), -1, dtype=np.int64)  # the lines that leave each disc by turn; last, the start
     latest = np.full(2 * len(obstacles.rims.begin), -1, dtype=np.int64)
-    heap = Heap(np.empty(256, dtype=np.float64), np.empty(256, dtype=np.int64))
+    heap = np.empty((256, 3))
     count, waiting, checked, line = 0, 0, 0, -1
     while True:
         source = 2 * n if line < 0 else 2 * lines.marks[line, DISC] + (1 if lines.marks[line, SENSE] > 0 else 0)
@@ -772,9 +728,7 @@ def shortest_path(discs: Array, bounds: Array, ends: Array, limit: float) -> tup
             span[source, 1] = count
             checked += more
         first, last = span[source, 0], span[source, 1]
-        while waiting + last - first > len(heap.key):
-            heap = Heap(doubled(heap.key), doubled(heap.line))
-        waiting = relax(obstacles, ends, line, lines, first, last, heap, waiting)
+        heap, waiting = relax(obstacles, ends, line, lines, first, last, heap, waiting)
         line, waiting = next_line(obstacles, lines, latest, heap, waiting)
         if line < 0:
             return np.empty((0, 6), dtype=np.float64), np.inf, checked

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -15,16 +15,6 @@ from antdrive.base.errors import require
 from antdrive.planners.anyangle.lines import RouteEnds, cells_along, route_ends, terrain
 from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Cells, PlanResult, Query
-
-
-@dataclass(frozen=True, kw_only=True)
-class ViaPointPlanner(IterativePlanner):
-    """A planner that returns a polyline over via points, independent of the grid's moves."""
-
-    @property
-    def work_unit(self) -> str:
-        """The unit of `work`."""
-        return "chromosomes rated"
 
 
 class Incumbent:
@@ -91,7 +81,7 @@ def seeded(rng: np.random.Generator) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class GaHan(ViaPointPlanner):
+class GaHan(IterativePlanner):
     """A genetic algorithm on a few via points.
 
     Han 2007, section 4.1: a chromosome is a sequence of via points on free cells. Each generation selects by
@@ -125,10 +115,8 @@ class GaHan(ViaPointPlanner):
     elite_breeds: bool = True
     tries: int = 1_000_000
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """Capabilities and requirements of this planner. It may miss an existing path."""
-        return Capabilities(iterative=True, complete=False)
+    capabilities: ClassVar[Capabilities] = Capabilities(iterative=True, complete=False)
+    work_unit: ClassVar[str] = "chromosomes rated"
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -11,24 +11,25 @@ import dataclasses
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import polyline_length
-from antdrive.planners.anyangle.ga_han import Incumbent, ViaPointPlanner, seeded
+from antdrive.planners.anyangle.ga_han import Incumbent, seeded
 from antdrive.planners.anyangle.lines import RouteEnds, route_ends, terrain
 from antdrive.planners.colonies.catalog import colonies
 from antdrive.planners.colonies.colony import Colony
-from antdrive.planners.iterative import WARMUP_ITERATIONS, Iteration
+from antdrive.planners.iterative import WARMUP_ITERATIONS, Iteration, IterativePlanner
 from antdrive.planners.plan import Cells, Query
 
 ROUNDS = 20  # tightening passes over the via points of a new path
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hybrid(ViaPointPlanner):
+class Hybrid(IterativePlanner):
     """Ants find a corridor; a genetic algorithm finds the line in it.
 
     Section 6.3 of Han 2007 only proposes the combination; the details are antdrive's. `ant_runs` colonies run
@@ -68,6 +69,8 @@ class Hybrid(ViaPointPlanner):
     degrees_per_point: float = 30.0
     max_shift: float = 2.0
 
+    work_unit: ClassVar[str] = "ant steps and chromosomes rated"
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.colony not in colonies():
@@ -85,11 +88,6 @@ class Hybrid(ViaPointPlanner):
         """Return this planner with one iteration of ants and two generations."""
         few = dataclasses.replace(self, ant_runs=1, ant_iterations=1, time_budget=None)
         return dataclasses.replace(few, iterations=min(self.iterations, 1 + WARMUP_ITERATIONS))
-
-    @property
-    def work_unit(self) -> str:
-        """The unit of `work`."""
-        return "ant steps and chromosomes rated"
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
         """Run the ants, pull their best path straight, then breed lines from it without end."""

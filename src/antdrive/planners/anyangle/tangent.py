@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -163,10 +164,7 @@ class Tangent(GridPlanner):
 
     bulge: float = 1e-3
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """Capabilities and requirements of this planner."""
-        return Capabilities(needs_world=True, deterministic=True)
+    capabilities: ClassVar[Capabilities] = Capabilities(needs_world=True, deterministic=True)
 
     def __post_init__(self) -> None:
         require("bulge", self.bulge, above=0)

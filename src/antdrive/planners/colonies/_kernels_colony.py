@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from antdrive.planners.graph._kernels_search import octile
 from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, inline, kernel
 from antdrive.worlds._kernels_turns import MoveGraph, after_move
 
@@ -28,15 +29,6 @@ def next_random(state: Any) -> Any:
     state ^= state >> np.uint64(7)
     state ^= state << np.uint64(17)
     return state
-
-
-@kernel
-def offsets(cols: int) -> Array:
-    """Return the flat index offset of each of the eight moves."""
-    out = np.empty(8, dtype=np.int64)
-    for k in range(8):
-        out[k] = DROW[k] * cols + DCOL[k]
-    return out
 
 
 @kernel
@@ -388,13 +380,6 @@ def union_moves(walks: Array, sizes: Array, to: Array, moves: Array) -> None:
             i = j
 
 
-@inline
-def _octile(rows: int, cols: int) -> float:
-    """Return the length of the shortest path over open ground [cells]."""
-    rows, cols = abs(rows), abs(cols)
-    return max(rows, cols) + (SQRT2 - 1.0) * min(rows, cols)
-
-
 @kernel
 def detour_weights(
     mask: Array,
@@ -422,7 +407,7 @@ def detour_weights(
         here = cell[i] if len(cell) else i
         row, col = here // cols, here % cols
         aside = (row - r0) * across_row + (col - c0) * across_col
-        to_goal[i] = _octile(r1 - row, c1 - col) + lane_pull * abs(aside - lane)
+        to_goal[i] = octile(r1 - row, c1 - col) + lane_pull * abs(aside - lane)
     for i in range(len(mask)):
         for k in range(8):
             weights[i, k] = 0.0

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.planners.colonies._kernels_colony import after, offsets
-from antdrive.planners.graph._kernels_incremental import put, take
+from antdrive.planners.colonies._kernels_colony import after
+from antdrive.planners.graph._kernels_incremental import offsets, put, take
 from antdrive.worlds._kernels import DCOL, DROW, Array, kernel
 from antdrive.worlds._kernels_turns import MoveGraph, behind
 

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError, require
+from antdrive.base.errors import require
+from antdrive.base.records import require_choices
 from antdrive.planners.colonies.colony import (
     FIRST_KIND,
     ChoiceContext,
@@ -76,10 +77,7 @@ class AcoHan(Colony):
         require("elitism", self.elitism, at_least=0)
         require("revisit", self.revisit, at_least=0)
         require("min_weight", self.min_weight, at_least=0)
-        if self.elite_of not in ("run", "iteration"):
-            raise FieldError("elite_of", f"must be 'run' or 'iteration', got {self.elite_of!r}")
-        if self.form not in ("equation", "letter", "listing"):
-            raise FieldError("form", f"must be 'equation', 'letter' or 'listing', got {self.form!r}")
+        require_choices(self)
 
     def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
         """Return tau(0) = 0 on every cell of `graph`."""

@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError, require
+from antdrive.base.errors import require
+from antdrive.base.records import require_choices
 from antdrive.planners.colonies.colony import (
     FIRST_KIND,
     ChoiceContext,
@@ -82,8 +83,7 @@ class AntSystem(Colony):
         require("mix", self.mix, at_least=0, at_most=1)
         if self.ranks is not None:
             require("ranks", self.ranks, at_least=1, at_most=1_000_000)
-        if self.heuristic not in ("goal", "step"):
-            raise FieldError("heuristic", f"must be 'goal' or 'step', got {self.heuristic!r}")
+        require_choices(self)
 
     def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
         """Return tau(0) = `initial` (1 - `mix` + `mix` chance) on every arc of `graph`; chance is uniform in (0, 1]."""
@@ -227,10 +227,6 @@ class ExploringAnts(AntSystem):
         super().__post_init__()
         require("explorers", self.explorers, at_least=0, at_most=1_000_000)
         require("elite", self.elite, at_least=0)
-        if self.depositors not in ("common", "all"):
-            raise FieldError("depositors", f"must be 'common' or 'all', got {self.depositors!r}")
-        if self.ties not in ("arc", "ant", "share"):
-            raise FieldError("ties", f"must be 'arc', 'ant' or 'share', got {self.ties!r}")
 
     @property
     def kinds(self) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -43,10 +43,11 @@ class ColonyGraph:
     def of(cls, query: Query) -> ColonyGraph:
         """Build the graph of a query's grid."""
         from antdrive.planners.colonies import _kernels_colony
+        from antdrive.planners.graph import _kernels_incremental
         from antdrive.worlds import _kernels_turns
 
         grid, goal = query.grid, query.goal_cell
-        mask, to = grid.moves.ravel(), _kernels_colony.offsets(grid.shape[1])
+        mask, to = grid.moves.ravel(), _kernels_incremental.offsets(grid.shape[1])
         if grid.turns:  # some moves cannot be taken back, so ants keep to nodes that lead to the goal
             kept = _kernels_turns.leads_to(grid.graph, np.array([goal])) >= 0
             mask, to = np.empty(len(kept), dtype=np.uint8), np.empty((len(kept), 8), dtype=np.int32)
@@ -236,6 +237,8 @@ class Colony(IterativePlanner):
     update_every: int | None = None
     restart_every: int | None = None
 
+    work_unit: ClassVar[str] = "ant steps"
+
     def __post_init__(self) -> None:
         super().__post_init__()
         require("ants", self.ants, at_least=1, at_most=1_000_000)
@@ -243,11 +246,6 @@ class Colony(IterativePlanner):
         for name in ("max_steps", "update_every", "restart_every"):
             if getattr(self, name) is not None:
                 require(name, getattr(self, name), at_least=1)
-
-    @property
-    def work_unit(self) -> str:
-        """The unit of `work`."""
-        return "ant steps"
 
     @property
     def capabilities(self) -> Capabilities:

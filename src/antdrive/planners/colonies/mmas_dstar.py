@@ -124,11 +124,9 @@ class MaxMinDStar(GridPlanner):
         return graph, pheromone, work, notes
 
     def walk(self, graph: ColonyGraph, pheromone: Floats) -> tuple[Flat, str]:
-        """Return the nodes of the path to the goal, none if the ant cycles to the end, and a remark on the exponents.
+        """Return the nodes of the path to the goal on `graph`, none if the ant cycles on, and a remark on the exponents.
 
-        Args:
-            graph: the ant's graph
-            pheromone: the pheromone of each node (nodes,), from `spread`
+        The ant follows the `pheromone` (nodes,) of `spread`.
         """
         from antdrive.planners.colonies import _kernels_mmas_dstar as kernels
 

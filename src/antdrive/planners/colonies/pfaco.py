@@ -9,21 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError, require, require_finite
+from antdrive.base.errors import require
+from antdrive.base.records import require_choices
 from antdrive.planners.colonies.colony import ColonyGraph
 from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Query
 
 if TYPE_CHECKING:  # importing kernels loads the compiler
     from antdrive.planners.colonies._kernels_pfaco import Ants, Ranking
-
-FORMS, FIELDS, MEMORIES = ("local", "rise", "letter", "distance"), ("start", "goal"), ("tabu", "none")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +108,8 @@ class PotentialFieldAnts(IterativePlanner):
     shortcut: bool = False
     generations: bool = False
 
+    work_unit: ClassVar[str] = "ant steps"
+
     def __post_init__(self) -> None:
         super().__post_init__()
         require("ants", self.ants, at_least=1, at_most=1_000_000)
@@ -117,20 +118,12 @@ class PotentialFieldAnts(IterativePlanner):
         require("mix", self.mix, at_least=0, at_most=1)
         for key in ("alpha_1", "beta_1", "alpha_2", "beta_2", "alpha_3", "beta_3"):
             require(key, getattr(self, key), at_least=0)
-        require_finite("repulsion", self.repulsion)
+        require("repulsion", self.repulsion)
         for key in ("attraction", "influence", "deposit", "min_pheromone", "convergence"):
             require(key, getattr(self, key), above=0)
         if self.max_steps is not None:
             require("max_steps", self.max_steps, at_least=1)
-        for key, known in (("form", FORMS), ("field", FIELDS), ("memory", MEMORIES)):
-            if getattr(self, key) not in known:
-                words = [f"{name!r}" for name in known]
-                raise FieldError(key, f"must be {', '.join(words[:-1])} or {words[-1]}, got {getattr(self, key)!r}")
-
-    @property
-    def work_unit(self) -> str:
-        """The unit of `work`."""
-        return "ant steps"
+        require_choices(self)
 
     @property
     def capabilities(self) -> Capabilities:
@@ -153,12 +146,7 @@ class PotentialFieldAnts(IterativePlanner):
         return np.where(free, climb - climb[free].min() + 0.5 * self.attraction, 0.0)
 
     def attractions(self, graph: ColonyGraph, field: Floats) -> Floats:
-        """Return U_ij of eq. 13 for each move of `graph` (nodes, 8); 0 where the move is not allowed.
-
-        Args:
-            graph: the ants' graph
-            field: the potential (nodes,)
-        """
+        """Return U_ij of eq. 13 in a potential `field` (nodes,) for each move of `graph` (nodes, 8); 0 for others."""
         there, here, least = graph.at_neighbours(field), field[:, None], 0.5 * self.attraction
         allowed = np.isfinite(there)
         if self.form == "local":
@@ -190,13 +178,7 @@ class PotentialFieldAnts(IterativePlanner):
             yield pool.report(query.grid.cell, trail, arrivals, steps)
 
     def initial_trail(self, field: Floats, free: npt.NDArray[np.bool_], rng: np.random.Generator) -> Floats:
-        """Return the pheromone before the first iteration (nodes,) by eq. 14.
-
-        Args:
-            field: the potential (nodes,)
-            free: whether each cell is free (nodes,)
-            rng: the source of chance
-        """
+        """Return the first pheromone (nodes,) by eq. 14, from the potential `field` and the `free` nodes (nodes,)."""
         trail = self.mix * rng.random(len(field)) + (1 - self.mix) * field / field.max()
         return np.where(free, np.maximum(trail, self.min_pheromone), 0.0)
 
@@ -212,14 +194,9 @@ class PotentialFieldAnts(IterativePlanner):
     def rebuild(
         self, trail: Floats, free: npt.NDArray[np.bool_], stage: int, pool: AntPool, rng: np.random.Generator
     ) -> None:
-        """Reset converged pheromone: at random, from the best tenth of the list, or from all of it (section IV-B).
+        """Reset a converged `trail` (nodes,), where `free`, by the rule of a `stage` (section IV-B).
 
-        Args:
-            trail: the pheromone, changed in place (nodes,)
-            free: whether each cell is free (nodes,)
-            stage: the stage, which selects the rule
-            pool: the ants, for their ranking list
-            rng: the source of random numbers, for stage 1
+        In stage 1 it is random, later from the best tenth of the ranking list of `pool`, then from all of it.
         """
         if stage == 1:
             trail[:] = np.where(free, np.maximum(rng.random(len(trail)), self.min_pheromone), 0.0)

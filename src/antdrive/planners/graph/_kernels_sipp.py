@@ -15,17 +15,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from antdrive.planners.graph._kernels_heap import STATE, G, drop_first, push
 from antdrive.planners.graph._kernels_search import octile
-from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, doubled_rows, inline, kernel, segment_distance2
+from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, inline, kernel, segment_distance2
 from antdrive.worlds._kernels_turns import MoveGraph
 
 INSTANT = 1e-9  # s: shorter gaps count as closed
 
 # Columns of a leg: start and end time, start position, velocity, clearance of the robot's centre.
 BEGIN, END, X, Y, VX, VY, KEEP = range(7)
-
-# Columns of an open-list entry: lower bound of the arrival at the goal, arrival here, state.
-F, G, STATE = range(3)
 
 
 class Frame(NamedTuple):
@@ -270,55 +268,6 @@ def safe_intervals(near: NearLegs, free: Array, frame: Frame, start: float, end:
             size += 1
     first[rows * cols] = size
     return first, since[:size].copy(), until[:size].copy()
-
-
-@inline
-def sooner(heap: Array, a: int, b: int) -> bool:
-    """Return whether entry a of the open list precedes entry b: by lower f, then by later arrival."""
-    return bool(heap[a, F] < heap[b, F] or (heap[a, F] == heap[b, F] and heap[a, G] > heap[b, G]))
-
-
-@inline
-def swap(heap: Array, a: int, b: int) -> None:
-    """Exchange two entries of the open list."""
-    for column in range(3):
-        heap[a, column], heap[b, column] = heap[b, column], heap[a, column]
-
-
-@kernel
-def push(heap: Array, size: int, f: float, g: float, state: int) -> Array:
-    """Add an entry to the `size` entries of the open list.
-
-    Returns the list, enlarged if it was full.
-    """
-    if size == len(heap):
-        heap = doubled_rows(heap)
-    heap[size, F], heap[size, G], heap[size, STATE] = f, g, state
-    n = size
-    while n > 0 and sooner(heap, n, (n - 1) >> 1):
-        swap(heap, n, (n - 1) >> 1)
-        n = (n - 1) >> 1
-    return heap
-
-
-@kernel
-def drop_first(heap: Array, size: int) -> int:
-    """Remove the first of the `size` entries of the open list; returns the new size."""
-    size -= 1
-    for column in range(3):
-        heap[0, column] = heap[size, column]
-    n = 0
-    while True:
-        child = 2 * n + 1
-        if child >= size:
-            break
-        if child + 1 < size and sooner(heap, child + 1, child):
-            child += 1
-        if not sooner(heap, child, n):
-            break
-        swap(heap, child, n)
-        n = child
-    return size
 
 
 @inline

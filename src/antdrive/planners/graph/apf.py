@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -45,10 +46,7 @@ class PotentialField(GridPlanner):
         require("k_rep", self.k_rep, at_least=0)
         require("influence", self.influence, above=0)
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """Capabilities and requirements of this planner. It may miss an existing path."""
-        return Capabilities(complete=False, deterministic=True)
+    capabilities: ClassVar[Capabilities] = Capabilities(complete=False, deterministic=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         from antdrive.planners.graph import _kernels_apf  # imported here because it loads the compiler

@@ -11,7 +11,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -285,10 +285,7 @@ def extended(array: npt.NDArray[Any], initial: float, rows: int) -> npt.NDArray[
 class IncrementalPlanner(GridPlanner):
     """A planner whose incremental search is also its replanner."""
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """Capabilities and requirements of this planner."""
-        return Capabilities(own_replanner=True, deterministic=True, turns=True)
+    capabilities: ClassVar[Capabilities] = Capabilities(own_replanner=True, deterministic=True, turns=True)
 
     @abc.abstractmethod
     def replanner(self, query: Query, rng: np.random.Generator) -> IncrementalSearch:

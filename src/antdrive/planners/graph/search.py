@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,10 +21,7 @@ class Dijkstra(GridPlanner):
     among cylinders it takes three times as long as A*. Its paths share A*'s weakness.
     """
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """Capabilities and requirements of this planner."""
-        return Capabilities(deterministic=True, turns=True)
+    capabilities: ClassVar[Capabilities] = Capabilities(deterministic=True, turns=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return shortest(query, informed=False)
@@ -40,10 +38,7 @@ class AStar(GridPlanner):
     discs (`tangent`), 12 per cent in the median; on open ground at most 8.2 per cent.
     """
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """Capabilities and requirements of this planner."""
-        return Capabilities(deterministic=True, turns=True)
+    capabilities: ClassVar[Capabilities] = Capabilities(deterministic=True, turns=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return shortest(query, informed=True)

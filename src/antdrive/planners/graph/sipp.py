@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -58,10 +59,7 @@ class SafeIntervals(GridPlanner):
         require("yaw_rate", self.yaw_rate, above=0)
         require("horizon", self.horizon, above=0)
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """Capabilities and requirements of this planner: it needs the movers' motions."""
-        return Capabilities(needs_motions=True, deterministic=True, turns=True)
+    capabilities: ClassVar[Capabilities] = Capabilities(needs_motions=True, deterministic=True, turns=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         return plan_in_time(

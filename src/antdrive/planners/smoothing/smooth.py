@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import polyline_length
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath
 from antdrive.planners.plan import PlanResult
@@ -35,28 +35,14 @@ if TYPE_CHECKING:
     from antdrive.planners.smoothing._kernels_smooth import String
 
 
-def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
-    """Return the plan's line in metres from the exact start to the goal, without collinear points.
-
-    The first or last point of the plan is omitted if the straight line past it keeps the grid's clearance. This
-    avoids a kink between the exact end and the centre of its cell. If the goal has less than the grid's
-    clearance, the route ends at the plan's last point.
-
-    Args:
-        plan: a plan with a path
-        grid: the plan's grid
-        task: the task of the grid
-
-    Raises:
-        ValueError: the plan has no path.
-    """
-    return Route(_points_along(plan, grid, task)[0])
-
-
 def _points_along(
     plan: PlanResult, grid: Grid, task: Task, more: float = 0.0, stretch: float = 0.0
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return the points of the plan's line (N, 2), which differ, and clearance and length of its segments (N - 1,) [m].
+
+    It leads from the exact start to the goal, without collinear points. The first or last point of the plan is omitted if the
+    straight line past it keeps the grid's clearance, which avoids a kink between the exact end and the centre of its cell. If the
+    goal has less clearance, the line ends at the plan's last point.
 
     Also returns the discs (M, 3) that count for routes at most `stretch` longer, with `more` than the grid's clearance. Others
     are left out; the clearance of a segment is that of these discs.
@@ -122,11 +108,9 @@ def smooth(
     """
     if kind not in SMOOTHINGS:
         raise FieldError("kind", f"unknown smoothing {kind!r}; choose from {', '.join(SMOOTHINGS)}")
-    for key, value in (("clearance", clearance), ("stretch", stretch)):
-        if not (math.isfinite(value) and value >= 0):
-            raise FieldError(key, f"must be at least 0, got {value:g}")
-    if not (math.isfinite(bulge) and bulge > 0):
-        raise FieldError("bulge", f"must be greater than 0, got {bulge:g}")
+    require("clearance", clearance, at_least=0)
+    require("stretch", stretch, at_least=0)
+    require("bulge", bulge, above=0)
     if grid.turns:
         return smooth_lines(plan, grid, task, kind)
     extra = clearance if kind == "clearance" else 0.0

@@ -33,12 +33,8 @@ def smooth_lines(plan: PlanResult, grid: Grid, task: Task, kind: str) -> Route:
     The first straight leads from the exact start to the first cell, backwards if the robot cannot turn to face it. The last
     leads to the exact goal if the outline stays clear on it; else the route ends at the last cell.
 
-    Args:
-        plan: a plan with a path
-        grid: its grid
-        task: the task of the grid
-        kind: `none` for the plan's straights; `taut` and `clearance` replace stretches by straights where the outline, with its
-            margin, stays clear on each and on the turns at both ends
+    The kind `none` keeps the plan's straights. `taut` and `clearance` replace stretches by straights where the outline, with
+    its margin, stays clear on each and on the turns at both ends.
     """
     outline = grid.turns.outline
     line, backwards = _planned(plan, grid, task, outline)

@@ -113,7 +113,7 @@ def profile_along(
     max_speed: float, lateral_acceleration: float, yaw_rate: float, yaw_acceleration: float, half_track: float,
     rim_speed: float, acceleration: float, deceleration: float,
 ) -> Array:  # fmt: skip
-    """Return the rows of a `SpeedProfile` (6, S).
+    """Return the rows of a `speed_profile` (6, S).
 
     Headings are averaged over `blend` on both sides with triangular weights. The heading is piecewise linear, so its average
     and the average's derivatives are exact second differences of its first and second integrals. `blend2` is `blend` squared.

@@ -29,13 +29,13 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
 
 from antdrive.base import Floats, Pose
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import require
 from antdrive.robots.clearance import outline_of
 from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.robots.control._kernels_pursuit import PursuitTuning, reachable_twist
@@ -103,11 +103,9 @@ class Avoidance:
 
     def __post_init__(self) -> None:
         for key in ("horizon", "step"):
-            if not 0 < getattr(self, key) <= 60:
-                raise FieldError(key, f"must be greater than 0 and at most 60, got {getattr(self, key):g}")
-        for key in _NOT_NEGATIVE:
-            if not 0 <= getattr(self, key) < math.inf:
-                raise FieldError(key, f"must be at least 0, got {getattr(self, key):g}")
+            require(key, getattr(self, key), above=0, at_most=60)
+        for option in fields(self):
+            require(option.name, getattr(self, option.name), at_least=0)
 
     @property
     def prediction_times(self) -> Floats:
@@ -288,21 +286,6 @@ def _execute(
         remaining = max(0.0, float(candidate[kernels.DURATION]) - period)
         state = AvoidanceState(tuple(candidate.tolist()), remaining)
     return Twist(*reachable_twist(speed, yaw_rate, *last, period, limits)), state
-
-
-_NOT_NEGATIVE = (
-    "min_clearance",
-    "preferred_clearance",
-    "clearance_weight",
-    "cross_track_weight",
-    "heading_weight",
-    "reversal_time",
-    "reversal_margin",
-    "reversal_weight",
-    "near_distance",
-    "reverse_speed",
-    "reverse_distance",
-)
 
 
 @functools.cache

@@ -22,7 +22,7 @@ from annotated_types import Interval
 
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.caches import Keyed, cached
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, require
 from antdrive.base.records import clamp_angle, derived, meanings_of, require_ranges
 from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
@@ -134,11 +134,7 @@ class TrackedPath:
         return *samples, *obstacles, corners, numbers
 
     def with_obstacles(self, obstacles: ObstacleIndex) -> TrackedPath:
-        """Return the path with other obstacles.
-
-        Args:
-            obstacles: index of the known obstacles
-        """
+        """Return the path with an index of other `obstacles`."""
         *samples, _, _, _, _, corners, numbers = self.packed
         numbers = numbers.copy()
         *arrays, numbers[SIDE] = obstacles
@@ -205,8 +201,7 @@ class PurePursuit:
         require_ranges(self)
         if self.lookahead_max < self.lookahead_min:
             raise FieldError("lookahead_max", f"must be at least lookahead_min ({self.lookahead_min:g})")
-        if not 0 < self.braking <= 1:
-            raise FieldError("braking", f"must be greater than 0 and at most 1, got {self.braking:g}")
+        require("braking", self.braking, above=0, at_most=1)
         if not self.rotate_in_place_until < self.rotate_in_place_above < math.pi / 2:
             raise FieldError(
                 "rotate_in_place_above",

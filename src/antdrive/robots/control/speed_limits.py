@@ -10,12 +10,11 @@ length of a step. `limits_along` adds the limits near obstacles; `_kernels_pursu
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError
 from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.control import _kernels_path
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
@@ -31,74 +30,24 @@ BACKWARDS = 0.3  # highest speed on the part of a route that is driven backwards
 HEADING_ERROR, DRIFT = 0.08, 0.025
 
 
-@dataclass(frozen=True, eq=False)
-class SpeedProfile:
-    """Speeds and times along a route; points with a rotation in place occur twice.
-
-    Attributes:
-        arc: length along the route, from 0 (S,) [m]
-        speed: speed, 0 at both ends (S,) [m/s]
-        time: arrival time, from 0 (S,) [s]
-        curvature: curvature of the path with rounded corners (S,) [1/m]
-        heading: unwrapped heading on that path, including rotations in place (S,) [rad]
-        limit: speed limit, irrespective of the speed at earlier points (S,) [m/s]
-    """
-
-    arc: Floats
-    speed: Floats
-    time: Floats
-    curvature: Floats
-    heading: Floats
-    limit: Floats
-
-    @property
-    def duration(self) -> float:
-        """Duration of the route [s]."""
-        return float(self.time[-1])
-
-    @property
-    def yaw_rate(self) -> Floats:
-        """Yaw rate (S,) [rad/s]."""
-        return self.speed * self.curvature
-
-
 def speed_profile(
-    route: Route,
-    spec: RobotSpec,
-    *,
-    blend: float = 0.2,
-    rotate_in_place_above: float = 1.0,
-    braking: float = 1.0,
-    step: float = STEP,
-) -> SpeedProfile:
-    """Return the fastest speeds along a route, from rest to rest, within all limits of the robot.
+    route: Route, spec: RobotSpec, blend: float, rotate_in_place_above: float, braking: float, step: float = STEP
+) -> Floats:
+    """Return the fastest speeds along a route, from rest to rest, within all limits of the robot (6, S).
+
+    The rows are arc length [m], speed [m/s], arrival time [s], curvature of the path with rounded corners [1/m], unwrapped
+    heading on it, including rotations in place [rad], and the speed limit irrespective of the speed at earlier points [m/s].
+    Points with a rotation in place occur twice.
 
     Args:
         route: the route
-        spec: the robot, with its limits of speed, acceleration, lateral acceleration, yaw rate, yaw acceleration and
-            wheels
+        spec: the robot
         blend: distance on both sides for averaging the route's curvature with triangular weights, because robots cannot
             follow a jump in curvature at speed [m]
         rotate_in_place_above: minimum angle of a corner at which the robot stops and rotates in place [rad]
         braking: fraction of the robot's deceleration for braking
         step: longest distance between two samples [m]
-
-    Raises:
-        ValueError: a setting is out of range.
     """
-    for key, value in (("blend", blend), ("rotate_in_place_above", rotate_in_place_above), ("step", step)):
-        if not (math.isfinite(value) and value > 0):
-            raise FieldError(key, f"must be greater than 0, got {value:g}")
-    if not 0 < braking <= 1:
-        raise FieldError("braking", f"must be greater than 0 and at most 1, got {braking:g}")
-
-    return SpeedProfile(*_profile(route, spec, blend, rotate_in_place_above, braking, step))
-
-
-def _profile(
-    route: Route, spec: RobotSpec, blend: float, rotate_in_place_above: float, braking: float, step: float = STEP
-) -> Floats:
-    """Return the rows of a speed profile (6, S)."""
     from antdrive.robots.control import _kernels_profile
 
     rows: Floats = _kernels_profile.profile_along(
@@ -113,9 +62,7 @@ def _profile(
 def heading_error(spec: RobotSpec, noise: float) -> float:
     """Return the heading error by noise and slip that the yaw acceleration must undo [rad].
 
-    Args:
-        spec: the robot
-        noise: factor on its documented noise; above 1 the error no longer grows
+    `noise` is the factor on the robot's documented noise; above 1 the error no longer grows.
     """
     return HEADING_ERROR * min(noise, 1.0) if spec.noise.nonzero else 0.0
 
@@ -123,24 +70,16 @@ def heading_error(spec: RobotSpec, noise: float) -> float:
 def steering_time(spec: RobotSpec, error: float) -> float:
     """Return the shortest lookahead time T whose steering the yaw acceleration can follow [s].
 
-    Pure pursuit returns to a straight with the natural frequency sqrt(2) / T. An oscillation of the heading by `error` then
-    needs the yaw acceleration 2 `error` / T^2. A robot that cannot reach it lags behind its commands and weaves.
-
-    Args:
-        spec: the robot
-        error: the heading error [rad]
+    Pure pursuit returns to a straight with the natural frequency sqrt(2) / T. An oscillation of the heading by `error` [rad]
+    then needs the yaw acceleration 2 `error` / T^2. A robot that cannot reach it lags behind its commands and weaves.
     """
     return math.sqrt(2 * error / spec.max_yaw_acceleration)
 
 
 def steady(spec: RobotSpec, error: float) -> RobotSpec:
-    """Return the robot, no faster than it can hold a line: it drifts at most `DRIFT` while it undoes a heading error.
+    """Return the robot, no faster than it can hold a line: it drifts at most `DRIFT` while it undoes a heading error [rad].
 
     From rest to rest that takes 2 sqrt(error / a) with the yaw acceleration a; on average half of the error is left.
-
-    Args:
-        spec: the robot
-        error: the heading error [rad]
     """
     drift = error * math.sqrt(error / spec.max_yaw_acceleration)  # per speed [s]
     return replace(spec, max_speed=DRIFT / drift) if spec.max_speed * drift > DRIFT else spec
@@ -153,7 +92,7 @@ def limits_along(
     from antdrive.robots.control import _kernels_profile
 
     samples: Floats = _kernels_profile.samples_along(
-        _profile(route, spec, blend, tuning.rotate_above, tuning.braking), route.xy, route.arc, lookahead, obstacles,
+        speed_profile(route, spec, blend, tuning.rotate_above, tuning.braking), route.xy, route.arc, lookahead, obstacles,
         tuning.spacing, spec.radius, tuning.lookahead_time,
         tuning.min_speed_near_obstacles, tuning.clearance_time, tuning.braking * spec.max_acceleration,
     )  # fmt: skip

@@ -26,7 +26,7 @@ from antdrive.robots.importing.sensors import decimal, import_lidar, lidar_senso
 from antdrive.robots.importing.wheels import RADII, Pair, driven_links, driven_wheels, notes_on_wheels
 from antdrive.robots.outline import Footprint
 from antdrive.robots.robot_file import footprint_to_dict, robot_from_text
-from antdrive.robots.spec import GRAVITY, RobotSpec, yaw_inertia_of
+from antdrive.robots.spec import GRAVITY, RobotSpec, yaw_inertia
 
 ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # defaults, if the motors allow them [m/s^2], [rad/s^2]
 SPEED, YAW_RATE = 0.5, 2.0  # defaults if the file has no limits [m/s], [rad/s]
@@ -108,7 +108,7 @@ def add_forces(model: UrdfModel, wheels: Pair, outline: Footprint, values: Origi
     mass, radius, track = (values[key][0] for key in ("mass", "wheel_radius", "track"))
     if "wheel_torque" not in given:
         values["wheel_torque"] = _torque(model, wheels, mass, radius)
-    inertia = yaw_inertia_of(mass, outline)
+    inertia = yaw_inertia(mass, outline)
     force = min(values["wheel_torque"][0] / radius, given.get("wheel_friction", FRICTION) * mass * GRAVITY / 2)
     for key, tags, most, usual in (
         ("max_acceleration", ("max_linear_acceleration",), 2 * force / mass, ACCELERATION),

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import shlex
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from antdrive.base.checks import resolve, suggest
+from antdrive.base.document import Location
 from antdrive.base.errors import FieldError
 from antdrive.base.files import file_name
 from antdrive.robots import list_robots, load_robot
 from antdrive.runs.campaigns.campaign import AXES, Campaign
-from antdrive.runs.campaigns.job import Job, NamedRobot, NamedSettings, NamedTask, PlannerVariant, SweepCase, run_key
+from antdrive.runs.campaigns.job import Job, NamedRobot, NamedTask, PlannerVariant, SweepCase
 from antdrive.runs.campaigns.resolving import OWN, SKIP, campaign_tasks, campaign_worlds, planner_variants
 from antdrive.sim.effects import idle_notes
-from antdrive.sim.forms import columns_of, option_text, scenario_fields, setting_words
+from antdrive.sim.forms import scenario_fields
 from antdrive.sim.log.record import canonical_hash
-from antdrive.sim.scenario import Scenario
+from antdrive.sim.scenario import Scenario, key_of
+from antdrive.sim.written import Written, unchosen
 from antdrive.worlds import Task
 from antdrive.worlds.formats.map_server import OF_SHADE
 
@@ -47,9 +49,9 @@ class Expansion:
         scenarios: list[Scenario] = []
         for case in cases.values():
             movers = frozenset((type(one), getattr(one, "seed", None)) for one in case.place.task.world.movers)
-            key = movers, case.robot.content, str(case.settings.columns), case.planner.label
+            key = movers, case.robot.content, str(case.written.settings), case.planner.label
             if key not in alike:
-                alike[key] = case.scenario(min(seeds), 0.0 if case.settings.fields["margin"] == "auto" else None)
+                alike[key] = case.scenario(min(seeds), unchosen)
             scenarios.append(alike[key])
         return idle_notes(scenarios, {"seed"} if len(seeds) > 1 else ())
 
@@ -71,9 +73,9 @@ def expand(campaign: Campaign) -> Expansion:
     jobs: dict[str, Job] = {}
     files: dict[str, Task] = {}
     for case in _cases(tasks, robots, settings, planners, files):
-        identity = case.identity
+        identity = case.resolved.identity
         for seed in campaign.entry.seeds:
-            key = run_key(identity, seed)
+            key = key_of(identity, seed)
             jobs.setdefault(key, Job(key, case, seed))
     counts = {
         **_count_tasks(tasks),
@@ -133,23 +135,22 @@ def _robots(campaign: Campaign) -> list[NamedRobot]:
     return list(robots.values())
 
 
-def _settings(campaign: Campaign) -> list[NamedSettings]:
-    """Return every combination of the campaign's axes and settings."""
+def _settings(campaign: Campaign) -> list[tuple[dict[str, Any], Location]]:
+    """Return every combination of the campaign's axes and settings, and the location of each."""
     for name, one in AXES.items():
         for i, value in enumerate(campaign.values(name)):
             if one.setting.choices and value not in one.setting.choices:
                 raise campaign.error((one.key, i), f"unknown {value!r}; {suggest(value, one.setting.choices)}")
     listed = list(zip(campaign.settings, campaign.places, strict=True))
+    keys = [one.key for one in AXES.values()]
     combinations = []
     for *values, (settings, place) in itertools.product(*map(campaign.values, AXES), listed):
-        given = {**settings, **dict(zip((one.key for one in AXES.values()), values, strict=True))}
+        given = {**settings, **dict(zip(keys, values, strict=True))}
         try:
-            fields = scenario_fields(given)
+            scenario_fields(given)
         except FieldError as error:
             raise campaign.error((*place, *error.key.split(".")), error.problem) from None
-        del fields["seed"]
-        words = setting_words(given)
-        combinations.append(NamedSettings(fields, columns_of(fields), None if words is None else tuple(words), place))
+        combinations.append((given, place))
     return combinations
 
 
@@ -161,31 +162,23 @@ def _fitting(
     campaign: Campaign,
     tasks: Sequence[NamedTask],
     robots: Sequence[NamedRobot],
-    settings: Sequence[NamedSettings],
+    settings: Sequence[tuple[dict[str, Any], Location]],
     planner: PlannerVariant,
     skipped: list[str],
 ) -> list[NamedTask]:
     """Reject, before any work, invalid settings and starts without room for the robot; skip those of `skip: true`."""
     unfit: dict[int, str] = {}
-    obstructed = list({one.fields["unseen"]: one for one in reversed(settings)}.values())
+    obstructed = list({str(one.get("unseen")): (one, place) for one, place in reversed(settings)}.values())
     moving = [n for n, task in enumerate(tasks) if task.task.world.movers]
     whole = {0, *moving[:1]}  # perception depends on whether there are movers
     for robot in robots:
         for n, task in enumerate(tasks):
-            for one in settings if n in whole else obstructed:
-                margin = 0.0 if one.fields["margin"] == "auto" else None
+            for given, place in settings if n in whole else obstructed:
                 try:
-                    SweepCase(
-                        place=task,
-                        world_hash="",
-                        planner=planner,
-                        robot=robot,
-                        settings=one.among(n in moving),
-                        words=None,
-                    ).scenario(0, margin)
+                    _case(task, "", "", robot, given, planner).scenario(0, unchosen)
                 except FieldError as error:
-                    place = _PLACES.get(error.key, (*one.place, error.key))
-                    where = task.place if error.key == "start" and not campaign.tasks else place
+                    where = _PLACES.get(error.key, (*place, error.key))
+                    where = task.place if error.key == "start" and not campaign.tasks else where
                     name = task.world if task.name == OWN else f"{task.world}, {task.name.replace('-', ' ')}"
                     problem = f"{name} with {robot.name}: {error.problem}"
                     if error.key != "start" or not task.name.startswith("problem-"):
@@ -197,10 +190,18 @@ def _fitting(
     return [task for n, task in enumerate(tasks) if n not in unfit]
 
 
+def _case(
+    task: NamedTask, content: str, world: str, robot: NamedRobot, given: dict[str, Any], planner: PlannerVariant
+) -> SweepCase:
+    """Return a configuration, with the canonical hash of its task and the world's name in commands."""
+    written = Written(world=world, planner=planner.word, options=planner.given, robot=robot.word, settings=given)
+    return SweepCase(place=task, world_hash=content, planner=planner, robot=robot, written=written)
+
+
 def _cases(
     tasks: Sequence[NamedTask],
     robots: Sequence[NamedRobot],
-    settings: Sequence[NamedSettings],
+    settings: Sequence[tuple[dict[str, Any], Location]],
     planners: Sequence[PlannerVariant],
     files: dict[str, Task],
 ) -> Iterator[SweepCase]:
@@ -211,17 +212,8 @@ def _cases(
         if task.catalogue is None:
             files[word] = task.task
         place = dataclasses.replace(task, others={})
-        known = [one.among(bool(task.task.world.movers)) for one in settings]
-        for robot, one, planner in itertools.product(robots, known, planners):
-            words = None if one.words is None else _words(word, robot.word, one.words, planner)
-            yield SweepCase(place=place, world_hash=content, planner=planner, robot=robot, settings=one, words=words)
-
-
-def _words(world: str, robot: str, settings: Sequence[str], planner: PlannerVariant) -> str:
-    """Return the command that repeats a run from the campaign's folder, without its seed."""
-    words = ["antdrive", "run", world, "--planner", planner.word]
-    words += [word for key, value in planner.given.items() for word in ("--set", f"planner.{key}={option_text(value)}")]
-    return shlex.join([*words, "--robot", robot, *settings])
+        for robot, (given, _), planner in itertools.product(robots, settings, planners):
+            yield _case(place, content, word, robot, given, planner)
 
 
 def _file_name(task: NamedTask) -> str:

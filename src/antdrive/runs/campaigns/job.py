@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from antdrive.base.document import Location
-from antdrive.planners import PLANNERS, load_planner, record_name
+from antdrive.planners import PLANNERS, load_planner
 from antdrive.robots import RobotSpec
 from antdrive.runs.margins.choice import Calibration, with_chosen_margin, with_margin_of
 from antdrive.sim.forms import columns_of
-from antdrive.sim.policy import usual_perception
-from antdrive.sim.scenario import Scenario, identity_text
+from antdrive.sim.scenario import Scenario
+from antdrive.sim.settings import SETTINGS
+from antdrive.sim.written import Written, unchosen
 from antdrive.worlds import Task
-
-KEY_DIGITS = 32  # hexadecimal digits of a key; two of 10^9 runs collide with probability 1e-21
 
 
 class TaskOrigin(NamedTuple):
@@ -68,22 +66,12 @@ class NamedRobot:
     file: Path | None  # its file; None: a robot of the catalogue
 
 
-@dataclass(frozen=True, eq=False)
-class NamedSettings:
-    """One combination of smoothing, noise, margin and settings."""
+class Resolved(NamedTuple):
+    """What follows from a configuration."""
 
-    # fields of `Scenario` by name; the margin may be "auto", and perception None until the world is known
-    fields: Mapping[str, Any]
-    columns: Mapping[str, Any]  # values of the setting columns
-    words: tuple[str, ...] | None  # words for `antdrive run`; None if it lacks an option for one of them
-    place: Location  # location of the settings in the campaign
-
-    def among(self, movers: bool) -> NamedSettings:
-        """Return the settings with the default perception in a world with or without movers, so that keys include it."""
-        if self.fields["perception"] is not None:
-            return self
-        fields = {**self.fields, "perception": usual_perception(self.fields["map"], movers)}
-        return dataclasses.replace(self, fields=fields, columns=columns_of(fields))
+    identity: str  # the text behind a run's key
+    columns: Mapping[str, Any]  # values of the setting columns; the margin as asked
+    margin: float | str  # the margin as set, which may be auto, else the default [m]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -95,8 +83,7 @@ class SweepCase:
         world_hash: canonical hash of the task
         planner: the planner with its options
         robot: the robot
-        settings: the settings of the drive
-        words: the command that repeats a run, without its seed; None if no command can
+        written: the configuration in the words of a command run in the campaign's folder
         calibration: calibration of the margin "auto"; None: not calibrated yet, or the margin is a number
     """
 
@@ -104,49 +91,42 @@ class SweepCase:
     world_hash: str
     planner: PlannerVariant
     robot: NamedRobot
-    settings: NamedSettings
-    words: str | None
+    written: Written
     calibration: Calibration | None = None
 
-    def scenario(self, seed: int, margin: float | None = None) -> Scenario:
+    def scenario(self, seed: int, choose: Callable[[Scenario], Scenario] | None = None) -> Scenario:
         """Return the scenario of a run.
 
         Args:
             seed: the run's seed
-            margin: overrides the campaign's margin [m]
+            choose: chooses the margin "auto"; None: by calibration
 
         Raises:
             InputError: the planner or an option is unknown, for example because its package is not installed.
             FieldError: a setting is out of range, or the robot does not fit at the start.
         """
-        fields, source = self.settings.fields, self.planner.source
-        choose = fields["margin"] == "auto" and margin is None
-        scenario = Scenario(
-            task=self.place.task,
-            planner=load_planner(source, **self.planner.given),
-            planner_name=record_name(source),
-            robot=self.robot.robot,
-            seed=seed,
-            **{**fields, "margin": 0.0 if choose else fields["margin"] if margin is None else margin},
-        )
-        if not choose:
-            return scenario
-        return with_margin_of(scenario, self.calibration) if self.calibration else with_chosen_margin(scenario)
-
-    @property
-    def identity(self) -> str:
-        """The text behind a run's key: the configuration."""
-        planner = self.planner
-        # Custom planners change more often than antdrive.
-        own = {} if planner.name in PLANNERS else {"planner_version": planner.version}
-        fields = {**self.settings.fields, "margin": self.margin}
-        return identity_text(self.world_hash, planner.name, planner.options, self.robot.content, fields, **own)
+        if choose is None:
+            choose = (
+                functools.partial(with_margin_of, calibration=self.calibration)
+                if self.calibration
+                else with_chosen_margin
+            )
+        planner = load_planner(self.planner.source, **self.planner.given)
+        words = dataclasses.replace(self.written, seed=seed)
+        return words.scenario(choose=choose, task=self.place.task, planner=planner, robot=self.robot.robot)
 
     @functools.cached_property
-    def margin(self) -> float | str:
-        """The margin as set, which may be auto, else the default [m]."""
-        asked: float | str | None = self.settings.fields["margin"]
-        return self.scenario(0).planned_margin if asked is None else asked
+    def resolved(self) -> Resolved:
+        """What follows from the configuration, made once."""
+        s, planner = self.scenario(0, unchosen), self.planner
+        asked: float | str | None = self.written.settings.get("margin")
+        margin = s.planned_margin if asked is None else asked
+        fields = {name: getattr(s, name) for name in SETTINGS if name != "seed"}
+        columns = columns_of({**fields, "margin": asked, "perception": s.known_perception})
+        # Custom planners change more often than antdrive.
+        own = {} if planner.name in PLANNERS else {"planner_version": planner.version}
+        known = {"task": self.world_hash, "robot": self.robot.content, "planner": planner.name, "margin": margin}
+        return Resolved(s.identity(**known, **own), columns, margin)
 
 
 class Job(NamedTuple):
@@ -161,8 +141,3 @@ class Job(NamedTuple):
     key: str
     case: SweepCase
     seed: int
-
-
-def run_key(identity: str, seed: int) -> str:
-    """Return the key of a run: a SHA-256, cut to 32 hexadecimal digits."""
-    return hashlib.sha256(f"{identity}\n{seed}".encode()).hexdigest()[:KEY_DIGITS]

@@ -29,7 +29,7 @@ MEDIANS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SweepResults:
     """The results of a campaign.
 
@@ -82,6 +82,11 @@ class SweepResults:
                 values = np.array([row[name] for row in own], dtype=float) * (1000.0 if unit.endswith(" ms") else 1.0)
                 cells.append(f"{np.median(values):.3g} ({values.min():.3g} to {values.max():.3g})")
             yield planner, str(len(own)), *cells
+
+    def __repr__(self) -> str:
+        return (
+            f"<SweepResults of {self.folder}: {len(self.table)} of {self.size} runs done, {self.succeeded} succeeded>"
+        )
 
     def pandas(self) -> Any:
         """Return the table as a pandas DataFrame; needs pandas."""

@@ -6,9 +6,9 @@ part is written once, when the run ends (`run_row`, `failed_row`).
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,8 @@ from antdrive.base.optional import parquet_library
 from antdrive.base.version import versions
 from antdrive.runs.campaigns.job import Job
 from antdrive.runs.comparing import PLANNER_FAULT as PLANNER_FAULT
-from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
+from antdrive.sim.facts import FACTS, IN_TABLE, facts_of
+from antdrive.sim.log.metrics import WALL_CLOCK
 from antdrive.sim.pipeline import Run
 from antdrive.sim.settings import SETTING_COLUMNS
 
@@ -49,28 +50,19 @@ GRID: Mapping[str, str] = {
 #: Result columns: name and type.
 RESULT: Mapping[str, str] = {
     "key": "string",
-    "outcome": "string",
-    "succeeded": "bool",
-    "certified": "bool",
-    "reason": "string",
-    "digest": "string",
-    "drive_digest": "string",
-    **{name: "double" for name in METRICS if name not in WALL_CLOCK},
-    "plan_length_m": "double",
-    "grid_optimum_m": "double",
+    **{name: FACTS[name].column for name in IN_TABLE if name not in WALL_CLOCK},
     "rollout": "string",
     **{f"version.{name}": "string" for name in VERSIONS},
-    "plan_s": "double",
-    "drive_wall_s": "double",
+    **{name: FACTS[name].column for name in WALL_CLOCK},
     "attempts": "int64",
 }
 
 
 def grid_row(job: Job) -> dict[str, Any]:
     """Return the grid columns of a run."""
-    case, planner, robot, fields = job.case, job.case.planner, job.case.robot, job.case.settings.fields
+    case, planner, robot = job.case, job.case.planner, job.case.robot
     x0, y0, x1, y1 = case.place.task.world.bounds
-    margin = case.calibration.margin if case.calibration else case.margin
+    margin = case.calibration.margin if case.calibration else case.resolved.margin
     return {
         "key": job.key,
         "world": case.place.world,
@@ -83,35 +75,18 @@ def grid_row(job: Job) -> dict[str, Any]:
         "options": json.dumps(planner.options, sort_keys=True),
         "robot": robot.name,
         "robot_hash": robot.content,
-        **case.settings.columns,
+        **case.resolved.columns,
         "margin": None if margin == "auto" else float(margin),
-        "cell": float(fields["cell"] or case.place.task.cell),
+        "cell": float(case.written.settings.get("cell") or case.place.task.cell),
         "seed": job.seed,
-        "command": None if case.words is None else f"{case.words} --seed {job.seed}",
+        "command": dataclasses.replace(case.written, seed=job.seed).command(),
     }
 
 
 def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
     """Return the result columns of a run that ended by itself."""
-    log, plan = run.rollout, run.plan
-    row = _empty(key) | {
-        "outcome": run.outcome.key,
-        "succeeded": run.succeeded,
-        "reason": run.reason,
-        "plan_length_m": plan.line_length if plan.solved else None,
-        "rollout": rollout,
-        "plan_s": plan.wall_s,
-    }
-    if log is None:
-        return row
-    return row | {
-        "certified": run.certificate is not None and run.certificate.certified,
-        "digest": log.digest,
-        "drive_digest": log.drive_digest,
-        **{name: None if math.isnan(value) else value for name, value in run.metrics.items()},
-        "plan_length_m": log.record.plan.length_m,
-        "grid_optimum_m": log.record.plan.grid_optimum_m,
-    }
+    facts = {name: None if value != value else value for name, value in facts_of(run, IN_TABLE).items()}
+    return _empty(key) | facts | {"rollout": rollout}
 
 
 def failed_row(key: str, outcome: str, reason: str) -> dict[str, Any]:

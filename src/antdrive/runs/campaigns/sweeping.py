@@ -29,6 +29,7 @@ from antdrive.runs.margins.choice import Calibration, choose_margin
 from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.pool import Done, Pool, cores
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.written import unchosen
 from antdrive.worlds import save_task
 
 OUTCOMES = (*(one.key for one in Outcome), PLANNER_FAULT, CRASHED, TOO_SLOW)
@@ -216,8 +217,8 @@ def calibrated(jobs: Iterable[Job]) -> list[Job]:
     chosen: dict[str, Calibration] = {}
     cases: dict[int, SweepCase] = {}
     for job in jobs:
-        if job.case.settings.fields["margin"] == "auto" and id(job.case) not in cases:
-            conditions = job.case.scenario(job.seed, margin=0.0).loss_factors
+        if job.case.resolved.margin == "auto" and id(job.case) not in cases:
+            conditions = job.case.scenario(job.seed, unchosen).loss_factors
             key = calibration_key(conditions)
             if key not in chosen:
                 chosen[key] = choose_margin(conditions)

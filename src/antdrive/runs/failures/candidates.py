@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
-import hashlib
 import itertools
 import json
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError
@@ -22,11 +19,9 @@ from antdrive.runs.failures.failure import Attempt, Failure, failure_of, failure
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import ENDED_BY, Run, plan, run
 from antdrive.sim.scenario import Scenario
-from antdrive.worlds.files.world_file import task_to_dict
 from antdrive.worlds.passage import feasible
 
 JOURNAL_EVERY = 2.0  # shortest interval between writes of the journal, except the last [s]
@@ -95,7 +90,7 @@ class CandidateRunner:
             "versions": versions(),
             "of": identity,
         }
-        self._header = _digest(header)
+        self._header = json.dumps(header, sort_keys=True)
         self._answers = _read(journal, self._header)
         self._known = frozenset(self._answers)
         self._latest: tuple[str, Rollout | None] | None = None
@@ -104,7 +99,7 @@ class CandidateRunner:
         """Return the first candidate that fails in the wanted way, or None; skip candidates that are None."""
         waiting = (candidate for candidate in candidates if candidate is not None)
         while batch := list(itertools.islice(waiting, self._jobs)):
-            keys = [_digest(changeable(candidate)) for candidate in batch]
+            keys = [candidate.key for candidate in batch]
             self._try([(key, candidate) for key, candidate in zip(keys, batch, strict=True)])
             for key, candidate in zip(keys, batch, strict=True):
                 if self._answers[key]:
@@ -113,7 +108,7 @@ class CandidateRunner:
 
     def rollout(self, scenario: Scenario) -> Rollout | None:
         """Return the drive of a scenario known to fail; None if it fails before driving."""
-        key = _digest(changeable(scenario))
+        key = scenario.key
         if self._latest is None or self._latest[0] != key:
             self._latest = key, Attempt.of(scenario).rollout
         return self._latest[1]
@@ -163,21 +158,9 @@ class CandidateRunner:
         )
 
 
-def changeable(scenario: Scenario) -> Mapping[str, Any]:
-    """Return everything in a scenario that shrinking may change, as plain values."""
-    return {
-        "task": task_to_dict(scenario.task),
-        "unseen": [dataclasses.astuple(disc) for disc in scenario.unseen],
-        "seed": int(scenario.seed),
-        "noise": float(scenario.noise),
-        "time_limit": scenario.time_limit,
-    }
-
-
 def identity_of(scenario: Scenario) -> str:
-    """Return a text that is equal for equal scenarios."""
-    fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
-    return _digest(settings_of({**fields, "planner": _text_of(scenario.planner)}))
+    """Return a text that is equal for equal scenarios, also with planners that are no records."""
+    return f"{scenario.key} {_text_of(scenario.planner)}"
 
 
 def _text_of(planner: Planner) -> str:
@@ -186,10 +169,6 @@ def _text_of(planner: Planner) -> str:
     if kind.__repr__ is not object.__repr__:
         return repr(planner)
     return f"{kind.__module__}.{kind.__qualname__}({sorted(vars(planner).items()) if hasattr(planner, '__dict__') else ''})"
-
-
-def _digest(value: Any) -> str:
-    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:20]
 
 
 def _read(journal: Path | None, header: str) -> dict[str, bool]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,21 +14,18 @@ import yaml
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, relative
-from antdrive.planners import list_planners, load_planner
 from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.robots.robot_file import footprint_to_dict
 from antdrive.runs.failures.failure import Attempt
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
-from antdrive.runs.suites.names import is_own_entry
 from antdrive.runs.suites.nearest import cause_of_contact, first_contact_kind
 from antdrive.runs.suites.scenarios import scenario_of
-from antdrive.runs.suites.suite import SuiteCase, load_suite
-from antdrive.sim.forms import written
+from antdrive.runs.suites.suite import load_suite
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import changes
 from antdrive.sim.pipeline import Run
 from antdrive.sim.scenario import Scenario
+from antdrive.sim.written import Written
 from antdrive.worlds import save_task
 
 #: Settings written even at their defaults, so that the test survives a change of defaults.
@@ -44,14 +41,12 @@ class Handover:
         failed: the attempt that failed
         bound: the metric's bound that it crosses, if that is its failure
         note: remark for readers; may be empty
-        planner: the planner as the suite writes it, such as {file: ../mine.py, name: Mine}; None: by its name
     """
 
     name: str
     failed: Attempt
     bound: Bound | None = None
     note: str = ""
-    planner: str | Mapping[str, Any] | None = None
 
 
 def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
@@ -74,14 +69,13 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
     robots: dict[str, RobotSpec] = {}
     for handover in handovers:
         failed = handover.failed
-        scenario = failed.scenario
         world = Path("worlds") / f"{handover.name}.yaml"
-        save_task(scenario.task, path.parent / world)
+        save_task(failed.scenario.task, path.parent / world)
+        entry = _written(failed.scenario, str(world), path.parent, robots).plain()
         entries[handover.name] = {
             **({"note": handover.note} if handover.note else {}),
-            "world": str(world),
-            **suite_entry(scenario, _robot(scenario.robot, path.parent, robots)),
-            **({"planner": handover.planner} if handover.planner else {}),
+            **{key: value for key, value in entry.items() if key != "seed"},
+            "seeds": [entry["seed"]],
             **({"expect": expectation(failed.run, handover.bound)} if failed.run is not None else {}),
             "baseline": False,
         }
@@ -90,38 +84,13 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
     return path
 
 
-def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
-    """Return a scenario as plain data with the keys of a suite, without its world and expectations."""
-    return {
-        "robot": robot,
-        "planner": planner_words(scenario),
-        **{key: getattr(scenario, key) for key in PINNED},
-        "margin": scenario.planned_margin,
-        **{key: value for key, value in written(lambda name: getattr(scenario, name)).items() if key != "seed"},
-        "seeds": [int(scenario.seed)],
-    }
-
-
-def planner_beside(
-    case: SuiteCase | None, own: str | None, scenario: Scenario, folder: Path
-) -> str | dict[str, Any] | None:
-    """Return the planner of a test or a log as a suite in `folder` writes it; None if it is registered."""
-    if case is not None:
-        return _planner_moved(case.entry.planner, case.suite.parent, folder)
-    return None if own is None else _planner_moved(planner_words(scenario, own), Path.cwd(), folder.absolute())
-
-
-def _planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> str | dict[str, Any] | None:
-    """Rewrite a suite's entry of a custom planner for a suite in another folder; None for a registered planner."""
-    if not is_own_entry(given):
-        return None
-    words = {"name": given} if isinstance(given, str) else dict(given)
-    file, mark, word = words["name"].rpartition(":")
-    if "file" in words:
-        words["file"] = relative(home / words["file"], folder)
-    elif mark and file.endswith(".py"):
-        words["name"] = f"{relative(home / file, folder)}:{word}"
-    return words if len(words) > 1 else str(words["name"])
+def _written(scenario: Scenario, world: str, folder: Path, robots: dict[str, RobotSpec]) -> Written:
+    """Return a scenario in words for a suite in a folder, with its world in a file."""
+    words = Written.of(scenario).moved(lambda name: relative(Path.cwd() / name, folder.absolute()))
+    pinned = {key: getattr(scenario, key) for key in PINNED}
+    settings = {**pinned, **words.settings, "margin": scenario.planned_margin}
+    robot = _robot(scenario.robot, folder, robots)
+    return dataclasses.replace(words, world=world, task=None, start=None, goal=None, robot=robot, settings=settings)
 
 
 def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
@@ -164,15 +133,6 @@ def renamed(scenario: Scenario, name: str, note: str = "") -> Scenario:
 def scenario_name(text: str) -> str:
     """Turn a text into a valid name of a scenario."""
     return file_name(text, ascii_only=True).lstrip("_.-")[:90] or "failure"
-
-
-def planner_words(scenario: Scenario, own: str | None = None) -> str | dict[str, Any]:
-    """Return a planner as a suite writes it: its name, with the options that differ from its defaults."""
-    name = own or scenario.planner_label
-    planner: Any = scenario.planner
-    usual: Any = load_planner(own) if own else list_planners().get(name)
-    options = changes(planner, usual) if dataclasses.is_dataclass(planner) and type(planner) is type(usual) else {}
-    return {"name": name, **options} if options else name
 
 
 def _robot(robot: RobotSpec, folder: Path, robots: dict[str, RobotSpec]) -> str:

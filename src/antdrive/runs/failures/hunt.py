@@ -186,8 +186,7 @@ POINTS = 60  # of a line, equally spaced
 
 def driven_line(rollout: Rollout) -> Floats:
     """Return the driven line up to the first contact, as `POINTS` equally spaced points (N, 2) [m]."""
-    end = int(rollout.contacts[0, 0]) + 1 if len(rollout.contacts) else len(rollout.t)
-    xy = rollout.pose[:end, :2]
+    xy = rollout.pose[: rollout.first_contact + 1, :2]
     along = arc_lengths(xy)
     at = np.linspace(0.0, along[-1], POINTS)
     return np.column_stack([np.interp(at, along, xy[:, k]) for k in (0, 1)])

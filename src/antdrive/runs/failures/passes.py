@@ -12,9 +12,10 @@ import numpy as np
 
 from antdrive.base import Bounds, Floats
 from antdrive.base.errors import FieldError
+from antdrive.base.plane import arc_lengths
 from antdrive.runs.failures.candidates import CandidateRunner
 from antdrive.runs.failures.ddmin import one_minimal
-from antdrive.sim.log.metrics import nearest_on_route
+from antdrive.sim.log.metrics import nearest_on_route, nearest_segments
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Disc, Mover
@@ -207,16 +208,14 @@ def _by_distance(scenario: Scenario, runner: CandidateRunner) -> list[int]:
 def _rest_of_route(rollout: Rollout, row: int) -> Floats:
     """Return the rest of the last route (N, 2) [m] from the point nearest to the robot at a row."""
     _, route = rollout.legs()[-1]
-    at = rollout.pose[row, :2]
-    feet = np.array([nearest_on_route(at[None], route[k : k + 2])[0] for k in range(len(route) - 1)])
-    k = int(np.hypot(*(feet - at).T).argmin())
-    return np.vstack([feet[k], route[k + 1 :]])
+    feet, segment = nearest_segments(rollout.pose[row : row + 1, :2], route)
+    return np.vstack([feet, route[segment[0] + 1 :]])
 
 
 def _failing_row(rollout: Rollout) -> int:
     """Return the row of the first contact, else of the minimum clearance, else the last."""
     if len(rollout.contacts):
-        return int(rollout.contacts[0, 0])
+        return rollout.first_contact
     return int(rollout.clearance.argmin()) if rollout.outcome.key == "succeeded" else len(rollout.t) - 1
 
 
@@ -236,7 +235,7 @@ def _nearer_goals(scenario: Scenario, rollout: Rollout | None) -> Iterator[Scena
     if rollout is None:
         return
     rest = _rest_of_route(rollout, _failing_row(rollout))
-    along = np.concatenate(([0.0], np.hypot(*np.diff(rest, axis=0).T).cumsum()))
+    along = arc_lengths(rest)
     for distance in BEYOND:
         if distance < along[-1] - 0.1:
             x, y = (round(float(np.interp(distance, along, rest[:, k])), 2) for k in (0, 1))

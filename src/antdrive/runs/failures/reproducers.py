@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from antdrive.runs.failures.failure import Attempt
-from antdrive.runs.failures.handover import Handover, planner_beside, renamed, run_elsewhere, write_suite
+from antdrive.runs.failures.handover import Handover, renamed, run_elsewhere, write_suite
 from antdrive.runs.failures.hunt import Finding, Hunt
 from antdrive.runs.failures.shrinker import Shrunk, shrink
 from antdrive.runs.suites.demands import Bound
@@ -44,7 +44,6 @@ def write_reproducers(
     hunt: Hunt,
     folder: Path,
     *,
-    planner: str | None = None,
     seconds: float = 20.0,
     progress: Callable[[float], None] | None = None,
 ) -> list[Reproducer]:
@@ -55,7 +54,6 @@ def write_reproducers(
     Args:
         hunt: the search
         folder: of the suite
-        planner: the planner as FILE.py:CLASS or MODULE:CLASS, if it is not registered
         seconds: time limit for shrinking each failure [s]
         progress: called with the completed fraction
     """
@@ -71,50 +69,35 @@ def write_reproducers(
         if progress is not None:
             progress((k + 1) / (len(hunt.distinct) + 1))
     notes = [(done.failure() or one.failure).sentence for done, one in zip(small, hunt.distinct, strict=True)]
-    suite = _write(small, notes, folder, planner)
+    suite = _write(small, notes, folder)
     with tempfile.TemporaryDirectory(prefix="antdrive-falsify-") as place:
         found = [Attempt(finding.scenario, None) for finding in hunt.distinct]
-        originals = _write(found, [""] * len(found), Path(place), planner)
+        originals = _write(found, [""] * len(found), Path(place))
         elsewhere = run_elsewhere(originals, suite)
     pairs = zip(elsewhere[: len(found)], elsewhere[len(found) :], strict=True)
-    return [
-        Reproducer(_name(k), finding, done, _repeats(finding, done, *pair))
-        for k, (finding, done, pair) in enumerate(zip(hunt.distinct, small, pairs, strict=True))
-    ]
+    made = []
+    for k, (finding, done, pair) in enumerate(zip(hunt.distinct, small, pairs, strict=True)):
+        same = pair == (finding.fingerprint, done.fingerprint) and done.failure() == finding.failure
+        made.append(Reproducer(_name(k), finding, done, same))
+    return made
 
 
 def _name(index: int) -> str:
     return f"failure-{index + 1}"
 
 
-def _repeats(finding: Finding, small: Attempt, original_elsewhere: str, small_elsewhere: str) -> bool:
-    """Return whether a failure and its minimal scenario repeat bitwise in another process and fail in the same way."""
-    same = (original_elsewhere, small_elsewhere) == (finding.fingerprint, small.fingerprint)
-    return same and small.failure() == finding.failure
-
-
-def write_reproducer(
-    shrunk: Shrunk, name: str, folder: Path, *, bound: Bound | None, planner: str | Mapping[str, Any] | None
-) -> tuple[Attempt, Path, bool]:
+def write_reproducer(shrunk: Shrunk, name: str, folder: Path, *, bound: Bound | None) -> tuple[Attempt, Path, bool]:
     """Write the suite of one minimal scenario; return its run, the suite, and whether it repeats in another process."""
     note = f"shrunk from {shrunk.original.task.world.name}: {shrunk.summary}"
     small = Attempt.of(renamed(shrunk.scenario, name, note))
     failure = small.failure(bound)
-    handover = Handover(name, small, bound, (failure or shrunk.failure).sentence, planner)
+    handover = Handover(name, small, bound, (failure or shrunk.failure).sentence)
     suite = write_suite(folder / f"{name}.drive.yaml", [handover])
     repeats = run_elsewhere(suite) == [small.fingerprint] and failure == shrunk.failure
     return small, suite, repeats
 
 
-def _write(failed: Sequence[Attempt], notes: Sequence[str], folder: Path, planner: str | None) -> Path:
+def _write(failed: Sequence[Attempt], notes: Sequence[str], folder: Path) -> Path:
     """Write the suite and the worlds of failures, each with a note; return the suite's path."""
-    handovers = [
-        Handover(
-            one.scenario.task.world.name,
-            one,
-            note=note,
-            planner=planner_beside(None, planner, one.scenario, folder),
-        )
-        for one, note in zip(failed, notes, strict=True)
-    ]
-    return write_suite(folder / SUITE, handovers)
+    named = zip(failed, notes, strict=True)
+    return write_suite(folder / SUITE, [Handover(one.scenario.task.world.name, one, note=note) for one, note in named])

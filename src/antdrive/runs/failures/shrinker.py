@@ -10,7 +10,6 @@ from antdrive.base.errors import InputError
 from antdrive.runs.failures.candidates import (
     CandidateRunner,
     OutOfTimeError,
-    changeable,
     failure_in,
     identity_of,
     room_in,
@@ -46,7 +45,7 @@ class Shrunk:
     @property
     def smaller(self) -> bool:
         """Whether anything was changed."""
-        return changeable(self.original) != changeable(self.scenario)
+        return self.original.key != self.scenario.key
 
     @property
     def summary(self) -> str:
@@ -120,11 +119,11 @@ def _smallest(scenario: Scenario, runner: CandidateRunner) -> tuple[Scenario, bo
     small = scenario
     try:
         for _ in range(ROUNDS):
-            before = changeable(small)
+            before = small.key
             for name, shrinking in PASSES:
                 runner.stage = name
                 small = shrinking(small, runner)
-            if changeable(small) == before:
+            if small.key == before:
                 return small, True
     except OutOfTimeError:
         pass

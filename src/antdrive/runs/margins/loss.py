@@ -14,13 +14,14 @@ import numpy.typing as npt
 
 from antdrive.base import Floats
 from antdrive.base.kernel_cache import sources_stamp
-from antdrive.base.plane import segment_lengths, wrap_angle
 from antdrive.base.version import versions
 from antdrive.planners import PLANNERS, Query, smooth
 from antdrive.robots import RobotSpec, outline_of
 from antdrive.sim.driving.drive import follow
 from antdrive.sim.driving.localising import localiser_of
 from antdrive.sim.driving.plants import Drive
+from antdrive.sim.log.certificate import travel_between
+from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
@@ -92,9 +93,8 @@ def _pillars(
     for at, away, factor in _places(line, radius, rng):
         size = math.exp(rng.uniform(smallest, largest))
         centre = at + (distance + size) * factor * np.array([math.cos(away), math.sin(away)])
-        room = min(
-            _distance(centre, line), float(np.hypot(*(free - centre).T).min(initial=math.inf)) - around + distance
-        )
+        beside = math.dist(centre, nearest_on_route(centre[None], line)[0])
+        room = min(beside, float(np.hypot(*(free - centre).T).min(initial=math.inf)) - around + distance)
         if rng.random() >= left_out and room >= distance + size - ROUNDING / 2:
             pillars.append(Disc(float(centre[0]), float(centre[1]), size))
     return tuple(pillars)
@@ -114,13 +114,6 @@ def _places(line: Floats, radius: float, rng: np.random.Generator) -> Iterator[t
         yield line[i + 1], inside, 1 / math.cos(turn / 2)  # at the distance from both legs
         for _ in range(2):
             yield line[i + 1], inside + math.pi + rng.uniform(-0.5, 0.5) * turn, 1.0
-
-
-def _distance(point: Floats, line: Floats) -> float:
-    """Return the distance of a point (2,) from a line (N, 2) [m]."""
-    steps, to = np.diff(line, axis=0), point - line[:-1]
-    share = np.clip((to * steps).sum(axis=1) / (steps**2).sum(axis=1), 0.0, 1.0)
-    return float(np.hypot(*(to - share[:, None] * steps).T).min())
 
 
 METHOD = 3  # increment when courses, statistics or search change, to invalidate cached results
@@ -172,10 +165,6 @@ def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
 
 def least_bound(log: Drive, radius: float, clearance: Floats) -> float:
     """Return the certain clearance from static obstacles at and between all rows of a drive [m]."""
-    dt, speed = np.diff(log.t), np.abs(log.twist)
-    speed = np.maximum(speed[:-1], speed[1:])
-    turned = np.abs(wrap_angle(np.diff(log.pose[:, 2])))
-    travel = np.maximum(segment_lengths(log.pose[:, :2]), speed[:, 0] * dt)
-    travel += radius * np.maximum(turned, speed[:, 1] * dt)
+    travel = travel_between(log.t, log.pose, log.twist, radius)
     between = (clearance[:-1] + clearance[1:] - travel) / 2
     return float(between.min(initial=clearance.min()))

@@ -57,7 +57,8 @@ def arm_facts(experiment: Experiment) -> dict[str, str]:
     facts["first pheromone"] = ", ".join(filter(None, (facts["first pheromone"], _first_trail(planner, query))))
     facts["step limit of an ant"] = _step_limit(planner, query)
     facts["budget"] = f"{experiment.work:,.0f} {ants.work_unit}" if ants and math.isfinite(experiment.work) else "–"
-    facts["counted as work"] = "cells propagated" if experiment.movers else _work_unit(planner, query)
+    planned = ants or planner.plan(query, np.random.default_rng(0))
+    facts["counted as work"] = "cells propagated" if experiment.movers else planned.work_unit
     facts[REST] = _listed({name: value for name, value in values.items() if name not in shown})
     return {head: facts[head] or "–" for head in HEADS}
 
@@ -130,8 +131,3 @@ def _step_limit(planner: Planner, query: Query) -> str:
         return ""
     steps = getattr(planner, "max_steps", None) or default(query.grid.free.size)
     return f"{steps:,}"
-
-
-def _work_unit(planner: Planner, query: Query) -> str:
-    ants = as_iterative(planner)
-    return ants.work_unit if ants else planner.plan(query, np.random.default_rng(0)).work_unit

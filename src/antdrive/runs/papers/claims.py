@@ -22,6 +22,7 @@ from antdrive.runs.papers.paper_runs import PaperRun
 from antdrive.runs.papers.paragraphs import read_table
 from antdrive.runs.statistics.intervals import Interval, means_by_world, medians_by_world, resampled, wilson
 from antdrive.runs.statistics.significance import wilcoxon
+from antdrive.sim.log.record import finite_or_none
 
 #: The margin of "no longer than" [points]: a small effect, A = 0.56 (Vargha & Delaney 2000), wins 56 : 44.
 SMALL_EFFECT = 12.0
@@ -126,6 +127,8 @@ class Measured:
     exact: bool = False  # the interval is valid for any number of runs, so that even few can refute
 
 
+NOTHING = Measured(math.nan, Interval(math.nan, math.nan), 0, "–", unknown="no path was found")
+
 #: By relation, whether an interval confirms it, and whether it refutes it. An interval that touches the bound does not refute.
 RELATIONS: Mapping[str, Callable[[Interval, float], tuple[bool, bool]]] = MappingProxyType(
     {
@@ -179,7 +182,8 @@ def _difference(claim: Claim, runs: RunsByArm) -> Measured:
     first, second, world = _paired(claim, runs)
     difference = np.round(first - second, 9)  # removes rounding errors
     value, interval = _median(difference, world)
-    why = f"{_counts(difference)}; Wilcoxon's p {wilcoxon(difference):.2g}"
+    less, equal, more = (int(np.sum(sign)) for sign in (difference < 0, difference == 0, difference > 0))
+    why = f"{less} less, {equal} equal, {more} more; Wilcoxon's p {wilcoxon(difference):.2g}"
     ours = f"median difference {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"
     return Measured(value, interval, len(difference), ours, why, _never(first, second))
 
@@ -256,7 +260,7 @@ def _mean_of_one(claim: Claim, runs: RunsByArm) -> Measured:
     values, _ = _together(claim, runs)
     known = values[values < NO_PATH]
     if not len(known):
-        return Measured(math.nan, Interval(math.nan, math.nan), 0, "–", unknown="no path was found")
+        return NOTHING
     value = float(known.mean())
     # All runs are on one map, so each counts on its own.
     interval = means_by_world(known[:, None], np.arange(len(known)))[0]
@@ -274,7 +278,7 @@ def _means_of_several(claim: Claim, runs: RunsByArm) -> Measured:
     ]
     lost = sum(len(runs[arm]) for arm in case) - sum(map(len, values))
     if not all(map(len, values)):
-        return Measured(math.nan, Interval(math.nan, math.nan), 0, "–", unknown="no path was found")
+        return NOTHING
     fractions = [known / float(printed) for known, printed in zip(values, claim.printed.split(", "), strict=True)]
     intervals = [means_by_world(known[:, None], np.arange(len(known)))[0] for known in fractions]
 
@@ -405,11 +409,6 @@ def _undecided(measured: Measured, claim: Claim) -> str:
     return f"{words}; {more if times < REPEATABLE else 'the difference is small beside the spread of the runs'}"
 
 
-def _counts(difference: Floats) -> str:
-    less, equal, more = (int(np.sum(sign)) for sign in (difference < 0, difference == 0, difference > 0))
-    return f"{less} less, {equal} equal, {more} more"
-
-
 def _never(first: Floats, second: Floats) -> str:
     return NEVER if min(first.min(), second.min()) >= NO_PATH else ""
 
@@ -512,26 +511,20 @@ def _written(value: float, digits: int) -> str:
 VERDICT_HEADS = ("verdict", "paper", "row", "claim", "reading", "printed", "ours", "arms", "why", "source")
 
 
-def verdict_cells(verdict: Verdict) -> list[str]:
-    """Return a row of the table, under `VERDICT_HEADS`."""
-    claim = verdict.claim
-    return [
-        verdict.decision.value,
-        claim.paper,
-        claim.id,
-        claim.sentence,
-        claim.reading,
-        claim.printed,
-        verdict.ours,
-        " : ".join(dict.fromkeys(arm.name for case in claim.cases for arm in case)),
-        verdict.why,
-        claim.source,
-    ]
-
-
 def verdict_facts(verdict: Verdict) -> dict[str, Any]:
-    """Return a verdict as plain data, for files and `--json`."""
-    cells = dict(zip(VERDICT_HEADS, verdict_cells(verdict), strict=True))
-    numbers = {"value": verdict.value, "low": verdict.low, "high": verdict.high}
-    known: Callable[[float], float | None] = lambda number: number if math.isfinite(number) else None  # noqa: E731
-    return {**cells, "kind": verdict.claim.kind, **{key: known(number) for key, number in numbers.items()}}
+    """Return a verdict as plain data, for files and `--json`, first what stands under `VERDICT_HEADS`."""
+    claim = verdict.claim
+    return {
+        "verdict": verdict.decision.value,
+        "paper": claim.paper,
+        "row": claim.id,
+        "claim": claim.sentence,
+        "reading": claim.reading,
+        "printed": claim.printed,
+        "ours": verdict.ours,
+        "arms": " : ".join(dict.fromkeys(arm.name for case in claim.cases for arm in case)),
+        "why": verdict.why,
+        "source": claim.source,
+        "kind": claim.kind,
+        **{name: finite_or_none(getattr(verdict, name)) for name in ("value", "low", "high")},
+    }

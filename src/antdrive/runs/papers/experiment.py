@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -63,20 +62,8 @@ def for_every_seed(query: Query) -> Callable[[int], Query]:
 
 def candidates(size: int, first: int, moves: tuple[int, int], **kind: Any) -> Callable[[int], Query]:
     """Return candidates for a square map from corner to corner, with `moves` = (straight, diagonal) on the shortest path."""
-    return lambda seed: cached_candidate((size, size), (0, 0), (size - 1, size - 1), moves, first + seed, *kind.items())
-
-
-@functools.cache
-def cached_candidate(
-    shape: tuple[int, int],
-    start: tuple[int, int],
-    goal: tuple[int, int],
-    moves: tuple[int, int],
-    seed: int,
-    *kind: tuple[str, Any],
-) -> Query:
-    """Return a candidate map, made once per process."""
-    return candidate(shape, start, goal, MoveCount(*moves), seed, **dict(kind))
+    ends = (0, 0), (size - 1, size - 1)
+    return lambda seed: candidate((size, size), *ends, MoveCount(*moves), first + seed, **kind)
 
 
 #: A planner's setting: name, printed value and options.

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from antdrive.planners import Cell, Query
-from antdrive.runs.papers.experiment import CANDIDATES, MANY_CANDIDATES, Experiment, cached_candidate
-from antdrive.runs.papers.maps import MoveCount, winding_candidate
+from antdrive.runs.papers.experiment import CANDIDATES, MANY_CANDIDATES, Experiment
+from antdrive.runs.papers.maps import MoveCount, candidate, winding_candidate
 
 
 class LeeMap(NamedTuple):
@@ -165,6 +165,5 @@ def _opposite(number: int, seed: int) -> Query:
 
 
 def _candidate(number: int, start: Cell, goal: Cell, seed: int) -> Query:
-    shape, (straight, diagonal) = MAPS[number].shape, (MAPS[number].moves.straight, MAPS[number].moves.diagonal)
-    kind = (("blocks", 20), ("largest", max(shape) // 6))
-    return cached_candidate(shape, start, goal, (straight, diagonal), 100 * number + seed, *kind)
+    shape, moves = MAPS[number].shape, MAPS[number].moves
+    return candidate(shape, start, goal, moves, 100 * number + seed, blocks=20, largest=max(shape) // 6)

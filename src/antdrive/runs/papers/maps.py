@@ -22,7 +22,7 @@ import numpy.typing as npt
 from antdrive.base.errors import FieldError
 from antdrive.planners import PLANNERS, Query
 from antdrive.planners.colonies.mmas_dstar import closed_gates
-from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
+from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, load_task, rasterise
 
 Circle: TypeAlias = tuple[float, float, float]  # x, y, radius
 #: The fourteen obstacles of han2007's ACO listing, radius 1, on points (1, 1) to (20, 20).
@@ -124,23 +124,13 @@ def blocks(rows: int, cols: int, count: int, largest: int, seed: int) -> Query:
 
 
 def environments() -> dict[str, Query]:
-    """Draw hasan's six environments of 50 x 50 cells by hand from the paper's text, with its starts and goals."""
-    vertical = np.zeros((50, 50), dtype=np.bool_)
-    vertical[6:44, 8:48:8] = True
-    vertical[20:26] = False
-    rng = np.random.default_rng(5)
-    shapes = np.zeros((50, 50), dtype=np.bool_)
-    for _ in range(30):
-        r, c = rng.integers(1, 45, 2)
-        height, width = rng.integers(1, 5, 2)
-        shapes[r : r + height, c : c + width] = True
-    shapes[23:26] = False
-    shapes[24, :47] = True
-    curved = _arc(5, 8, 18.6, 185, 170) | _arc(38, 30, 7, 90, 90) | _arc(36, 8, 6, 270, 90) | _arc(14, 40, 6, 0, 90)
-    overlapping = _arc(2, 26, 11, 270, 220) | _arc(34, 26, 16, 90, 220) | _arc(36, 40, 6, 90, 90)
-    circles = _arc(24, 24, 6, 0, 40) | _arc(24, 24, 12, 180, 30) | _arc(24, 24, 18, 0, 25)
-    pictures = (curved, overlapping, vertical, circles, shapes, shapes)
-    return {name: _between(picture, *HASAN[name].ends) for name, picture in zip(HASAN, pictures, strict=True)}
+    """Return hasan's six environments of 50 x 50 cells as the catalogue's worlds have them, drawn from the paper's text."""
+    queries = {}
+    for name in HASAN:
+        task = load_task(f"hasan-{name.split()[0]}")
+        grid = rasterise(task.world, task.cell)
+        queries[name] = Query(Grid.from_free(grid.free), grid.cell_at(*task.start[:2]), grid.cell_at(*task.goal))
+    return queries
 
 
 class Printed(NamedTuple):
@@ -292,16 +282,7 @@ class MoveCount:
         return self.straight + 2 * self.diagonal == rows + cols and self.diagonal <= min(rows, cols)
 
 
-def move_counts(printed: float, digits: int = 3) -> list[MoveCount]:
-    """Return the moves that give a printed length."""
-    counts = []
-    for diagonal in range(int(printed / SQRT2) + 1):
-        straight = round(printed - SQRT2 * diagonal)
-        if abs(straight + SQRT2 * diagonal - printed) < 10.0**-digits:
-            counts.append(MoveCount(straight, diagonal))
-    return counts
-
-
+@functools.cache
 def candidate(
     shape: tuple[int, int],
     start: tuple[int, int],
@@ -317,7 +298,7 @@ def candidate(
     margin: int = 1,
     obstacles: int | None = None,
 ) -> Query:
-    """Return a random map whose shortest path has the given straight and diagonal moves.
+    """Return a random map whose shortest path has the given straight and diagonal moves, made once per process.
 
     It begins with random obstacles. Further ones are put onto the shortest path until it has, but never exceeds, the
     wanted length. Obstacles keep `margin` free cells from start and goal. With `obstacles`, the map has exactly this

@@ -42,7 +42,6 @@ from antdrive.runs.papers.claims import (
     evaluate,
     runs_available,
     runs_needed,
-    verdict_cells,
     verdict_facts,
 )
 from antdrive.runs.papers.experiment import Experiment
@@ -113,7 +112,9 @@ def save_runs(runs: Sequence[PaperRun], path: Path, key: str) -> None:
         "numbers": np.array([[getattr(run, name) for name in NUMBERS] for run in runs]).reshape(-1, len(NUMBERS)),
         "status": np.array([plan.status.name for plan in plans], dtype=np.str_),
         "work": np.array([plan.work for plan in plans]),
-        "lengths": np.array([[plan.cost, _or_nan(plan.length)] for plan in plans]).reshape(-1, 2),
+        "lengths": np.array([[plan.cost, math.nan if plan.length is None else plan.length] for plan in plans]).reshape(
+            -1, 2
+        ),
         "cells": np.concatenate([np.empty((0, 2), dtype=np.int32), *(plan.cells for plan in plans)]),
         "sizes": np.array([len(plan.cells) for plan in plans]),
         "waypoints": np.concatenate([np.empty((0, 2)), *(line for line in lines if line is not None)]),
@@ -152,10 +153,6 @@ def load_runs(path: Path, key: str) -> list[PaperRun] | None:
         )
         runs.append(PaperRun(int(seed), int(world), plan, *map(float, arrays["numbers"][k])))
     return runs
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 def _parts(joined: npt.NDArray[Any], sizes: npt.NDArray[np.int64]) -> list[npt.NDArray[Any]]:
@@ -229,14 +226,17 @@ def reproduce(
     verdicts = [evaluate(claim, runs) for claim, runs in _measured_claims(arms)]
     settings = _settings(experiments)
     claims = [verdict_facts(one) | {"settings": _arms_of(one.claim, settings)} for one in verdicts]
+    arm_rows = ([paper, arm, *merged(on).values()] for paper, own in settings.items() for arm, on in own.items())
     files = {
         "table": _write_table(HEADS, map(row_cells, rows), folder / "table.md", NOTE),
         "csv": _write_csv([vars(row) for row in rows], folder / "table.csv"),
-        "claims": _write_table(VERDICT_HEADS, map(verdict_cells, verdicts), folder / "claims.md"),
+        "claims": _write_table(
+            VERDICT_HEADS, ([row[h] for h in VERDICT_HEADS] for row in claims), folder / "claims.md"
+        ),
         "claims csv": _write_csv(
             [row | {"settings": json.dumps(row["settings"])} for row in claims], folder / "claims.csv"
         ),
-        "arms": _write_table(("paper", "arm", *ARM_HEADS), _arm_rows(settings), folder / "arms.md"),
+        "arms": _write_table(("paper", "arm", *ARM_HEADS), arm_rows, folder / "arms.md"),
     }
     return Reproduction(measured, rows, verdicts, claims, files, kept)
 
@@ -262,23 +262,15 @@ def _arms_of(claim: Claim, settings: Settings) -> dict[str, dict[str, str]]:
     }
 
 
-def _arm_rows(settings: Settings) -> Iterator[list[str]]:
-    for paper, arms in settings.items():
-        for name, places in arms.items():
-            yield [paper, name, *merged(places).values()]
-
-
 def _experiments(papers: Sequence[str], quick: bool) -> list[Experiment]:
     """Return the experiments of papers; a quick run omits slow ones and uses fewer ant steps and maps."""
     for paper in papers:
         if paper not in PAPERS:
             raise InputError(f"reproduce: unknown paper {paper!r}; choose from {', '.join([*PAPERS, 'all'])}")
     every = [experiment for paper in papers for experiment in PAPERS[paper]()]
-    return [_hurried(experiment) for experiment in every if not experiment.slow] if quick else every
-
-
-def _hurried(experiment: Experiment) -> Experiment:
-    return dataclasses.replace(experiment, work=experiment.work / 10, worlds=min(experiment.worlds, 2), rounds=1)
+    if not quick:
+        return every
+    return [dataclasses.replace(e, work=e.work / 10, worlds=min(e.worlds, 2), rounds=1) for e in every if not e.slow]
 
 
 def _all_runs(

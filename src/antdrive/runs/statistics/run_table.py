@@ -131,6 +131,10 @@ class RunTable:
         """Return a column as text; empty for missing values."""
         return ["" if value is None else str(value) for value in self.columns.get(name, [None] * len(self))]
 
+    def worded(self, name: str) -> bool:
+        """Return whether a column holds text."""
+        return any(isinstance(value, str) for value in self.columns.get(name, ()))
+
     def numbers(self, name: str) -> Floats:
         """Return a column as numbers, (N,); nan for missing values."""
         values = self.columns.get(name, [None] * len(self))

@@ -3,8 +3,8 @@ from .demands import Bound as Bound
 from .demands import Demands as Demands
 from .evaluation import Evaluation as Evaluation
 from .evaluation import evaluate as evaluate
-from .names import select as select
 from .scenarios import scenario_of as scenario_of
+from .scenarios import select as select
 from .suite import SuiteCase as SuiteCase
 from .suite import load_suite as load_suite
 from .suite import suite_schema as suite_schema

@@ -26,10 +26,12 @@ from antdrive.planners.user_code import module_hash
 from antdrive.runs.suites.nearest import ClosestApproach, nearest_of
 from antdrive.runs.suites.suite import shown_path
 from antdrive.sim.compose import compose
+from antdrive.sim.facts import facts_of
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import canonical_hash, hashes_of_configuration
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.timeline import Timeline
 from antdrive.sim.pipeline import ENDED_BY, Run
 from antdrive.sim.recording import configuration_of
 from antdrive.sim.scenario import Scenario
@@ -115,22 +117,23 @@ class Baseline:
             run: the run
             case: the test's name
         """
-        rollout, certificate = run.rollout, run.certificate
+        rollout, names = run.rollout, [name for name in METRICS if name not in WALL_CLOCK]
+        facts = facts_of(run, ("certified", "bound_m", "drive_digest", *names))
         baseline = cls(
             case=case,
             outcome=run.outcome,
             reason=run.reason,
-            certified=certificate is not None and certificate.certified,
-            bound_m=_rounded(certificate.bound) if certificate else None,
-            metrics=_metrics(rollout) if rollout else {},
+            certified=bool(facts["certified"]),
+            bound_m=_rounded(facts["bound_m"]),
+            metrics={name: _rounded(facts[name]) for name in names if name in facts},
             nearest=nearest_of(rollout) if rollout else None,
             hashes=configuration_hashes(run),
             versions=versions(),
-            drive_digest=rollout.drive_digest if rollout else "",
+            drive_digest=facts["drive_digest"] or "",
             limiters=rollout.record.limiters if rollout else (),
             line_hz=LINE_HZ,
             line=_line(rollout, LINE_HZ) if rollout else (),
-            margin_m=_chosen_margin(run),
+            margin_m=run.scenario.margin if run.scenario.chosen is not None else None,
         )
         while rollout and len(baseline.to_text()) > MAX_BYTES and baseline.line_hz > LEAST_HZ:
             hz = baseline.line_hz / 2
@@ -268,28 +271,18 @@ def fixed_hashes(s: Scenario) -> dict[str, str]:
     }
 
 
-def _chosen_margin(run: Run) -> float | None:
-    return run.scenario.margin if run.scenario.chosen is not None else None
-
-
-def _rounded(value: float) -> float | None:
-    return round(value, 6) if math.isfinite(value) else None
-
-
-def _metrics(rollout: Rollout) -> dict[str, float | None]:
-    return {name: _rounded(metric(rollout)) for name, metric in METRICS.items() if name not in WALL_CLOCK}
+def _rounded(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else round(value, 6)
 
 
 def _line(rollout: Rollout, hz: float) -> tuple[tuple[float, float, float, int], ...]:
     """Sample the driven line at a rate, with the drive's end as the last sample."""
     end = float(rollout.t[-1])
     moments = np.append(np.arange(0.0, max(end - 0.5 / hz, 0.0), 1 / hz), end) if end > 0 else np.zeros(1)
-    rows = np.clip(np.round(moments * rollout.record.physics_hz).astype(int), 0, len(rollout.t) - 1)
-    # Interpolate, because the physics rate need not be a multiple of the line's.
-    turned = np.column_stack([rollout.pose[:, :2], np.unwrap(rollout.pose[:, 2])])
-    x, y, yaw = (np.interp(moments, rollout.t, turned[:, axis]) for axis in range(3))
+    timeline = Timeline(rollout)  # it interpolates, because the physics rate need not be a multiple of the line's
+    x, y, yaw = timeline.poses(moments).T
     samples = np.column_stack([x, y, wrap_angle(yaw)]).tolist()
     return tuple(
         (round(x, 3) + 0.0, round(y, 3) + 0.0, round(a, 3) + 0.0, int(rule))
-        for (x, y, a), rule in zip(samples, rollout.limiter[rows].tolist(), strict=True)
+        for (x, y, a), rule in zip(samples, rollout.limiter[timeline.nearest(moments)].tolist(), strict=True)
     )

@@ -24,6 +24,7 @@ from antdrive.runs.suites.nearest import cause_of_contact, first_contact, first_
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.timeline import Timeline
 from antdrive.sim.pipeline import Run
 from antdrive.sim.rerun import UNSTEADY, fingerprint_of, is_unsteady
 from antdrive.sim.scenario import Scenario
@@ -60,8 +61,7 @@ def _rule(name: str) -> str:
 
 def distances(baseline: Baseline, rollout: Rollout) -> Floats:
     """Return the robots' distance at each sample of the baseline's line (N,) [m]; a robot rests where its drive ended."""
-    places = np.column_stack([np.interp(baseline.times, rollout.t, rollout.pose[:, axis]) for axis in (0, 1)])
-    return np.asarray(np.hypot(*(places - baseline.xy).T))
+    return np.asarray(np.hypot(*(Timeline(rollout).poses(baseline.times)[:, :2] - baseline.xy).T))
 
 
 def farthest(baseline: Baseline, rollout: Rollout) -> float:
@@ -86,7 +86,7 @@ def divergence(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Di
         return None
     at = int(far.argmax())
     t = float(baseline.times[at])
-    row = min(round(t * rollout.record.physics_hz), len(rollout.t) - 1)
+    row = int(Timeline(rollout).nearest(t))
     names, names_then = rollout.record.limiters, baseline.limiters
     rule, rule_then = int(rollout.limiter[row]), baseline.line[at][3]
     x, y = rollout.pose[row, :2].tolist()
@@ -277,7 +277,7 @@ def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluatio
                     missing.append(name)
             faults += _line_faults(run.rollout, baseline, demands)
             if missing:
-                notes.append(f"not compared: {', '.join(missing)}; missing or null in the baseline: renew it")
+                notes.append(f"not compared: {', '.join(missing)}; the baseline has no value; antdrive accept adds it")
     return Evaluation(tuple(faults), tuple(gains), tuple(notes))
 
 

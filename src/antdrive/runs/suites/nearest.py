@@ -109,7 +109,7 @@ def cause_of_contact(rollout: Rollout) -> str:
     """
     if first_contact_kind(rollout) not in (CYLINDER, WALL):
         return ""
-    rows = int(rollout.contacts[0, 0]) + 1
+    rows = rollout.first_contact + 1
     arrays = ("t", "pose", "twist", "command", "clearance", "limiter", "movers")
     cut = {name: getattr(rollout, name)[:rows] for name in arrays}
     cut |= {name: getattr(rollout, name)[:rows] for name in ("estimate", "actuated") if len(getattr(rollout, name))}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import os
 import re
@@ -17,11 +18,13 @@ from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import unreadable
 from antdrive.base.records import STRICT
+from antdrive.planners.registry import PLANNERS
 from antdrive.runs.suites.demands import END, KINDS, Demands, causes
 from antdrive.sim.forms import SeedList, TextOrMapping, file_fields, given_settings
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.settings import SETTINGS
+from antdrive.sim.settings import SETTINGS, tested_settings
+from antdrive.sim.written import Written
 
 SUFFIX = ".drive.yaml"
 MAX_CASES = 100_000  # most tests (scenarios times seeds) in one suite
@@ -64,8 +67,7 @@ class CaseEntry(BaseModel):
     robot: str = Field("turtlebot", description="a robot file relative to the suite, or a robot of the catalogue")
     planner: TextOrMapping = Field(
         "ants",
-        description="a planner's name; {name: aco-han, ants: 200} with options; planners.py:Mine, {file: planners.py, "
-        "name: Mine} or {module: my_package.planners, name: Mine} for a custom planner",
+        description="a planner's name, planners.py:Mine or my_package.planners:Mine; {name: aco-han, ants: 200} with options",
     )
     seeds: SeedList = Field([0], description="one test for each: [0, 1, 2], or a range such as 0-9")
     expect: dict[str, Any] = Field(
@@ -129,9 +131,17 @@ class SuiteCase:
     own: frozenset[str]
 
     @property
-    def given(self) -> dict[str, Any]:
-        """The settings given by the scenario or the defaults, by key."""
-        return given_settings(self.entry)
+    def written(self) -> Written:
+        """The scenario as written, with files relative to the suite; a custom planner drives its own plan by default."""
+        entry, settings = self.entry, given_settings(self.entry)
+        places = {key: getattr(entry, key) for key in ("world", "task", "start", "goal", "robot", "planner")}
+        try:
+            written = Written.read(
+                {**{key: at for key, at in places.items() if at is not None}, **settings, "seed": self.seed}
+            )
+        except FieldError as error:
+            raise self.error(error.key, error.problem) from None
+        return dataclasses.replace(written, settings=tested_settings(settings, custom=written.planner not in PLANNERS))
 
     @property
     def id(self) -> str:

@@ -59,7 +59,7 @@ def _rebuilt(rollout: Rollout) -> LoggedOdometry:
     from antdrive.sim.sensing.pose_filter import PoseFilter
 
     record, rows, track = rollout.record, len(rollout.t), rollout.record.robot.track
-    period, per_tick = 1 / record.control_hz, max(1, record.physics_hz // record.control_hz)
+    period, per_tick = 1 / record.control_hz, record.rows_per_period
     start = record.task.start
     localiser = logged_localiser(record)
     if isinstance(localiser, Exact):

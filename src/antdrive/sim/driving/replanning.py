@@ -32,7 +32,7 @@ from antdrive.planners import (
     smooth,
 )
 from antdrive.robots import TrackedPath
-from antdrive.sim.driving.blockage import Blockage, blocked_cells, covered_discs, with_obstacles
+from antdrive.sim.driving.blockage import Blockage, blocked_cells, covered_discs, points_at, with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversAhead, Traffic
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
@@ -90,7 +90,7 @@ class Replanning(OneRoute):
         self._ahead.observe(tick, pose, waiting)
         if self.blockage.pause(tick, pose[:2]) or now - self._replanned_at < policy.min_interval:
             return ""
-        deviation = math.dist(_point_at(tracked.route, arc), pose[:2])
+        deviation = math.dist(points_at(tracked, np.array([arc]))[0], pose[:2])
         shortfall = math.dist(tracked.route.xy[-1], pose[:2]) - (tracked.length - arc)
         if deviation > policy.max_deviation or shortfall > policy.max_shortfall:
             return STRAYED
@@ -154,12 +154,6 @@ class Replanning(OneRoute):
 
     def _prepare(self, route: Route) -> TrackedPath:
         return self._routes.prepared(route, self._task.world, self._routes.margin)
-
-
-def _point_at(route: Route, arc: float) -> tuple[float, float]:
-    """Return the point of a route at an arc length [m]."""
-    x, y = (float(np.interp(arc, route.arc, route.xy[:, k])) for k in (0, 1))
-    return x, y
 
 
 DECISION_PAUSE = 0.2  # shortest time between two decisions [s]

@@ -106,10 +106,9 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
     if localiser.noisy and not len(rollout.actuated) == len(rollout.estimate) == len(rollout.t):
         yield "replay: actuated and estimate are missing; required with noise"
         localiser = Exact()
-    per_tick = record.physics_hz // record.control_hz
+    per_tick = record.rows_per_period
     # A period's first row is the last row of the previous period; a contact ends control.
-    touched = int(rollout.contacts[0, 0]) if len(rollout.contacts) else len(rollout.t)
-    rows = range(0, min(touched, len(rollout.t) - 1), per_tick)
+    rows = range(0, min(rollout.first_contact, len(rollout.t) - 1), per_tick)
     scans, resets = scans_of(rollout)
     plant, reader = Logged(rollout), Reader(rollout, len(rows), resets)
     periods = len(rows) + _decided_at_the_end(rollout, per_tick)
@@ -150,7 +149,7 @@ class Logged:
     def __init__(self, rollout: Rollout) -> None:
         self.actuated: list[Twist] = []
         self._rollout, self._row = rollout, 0
-        self._per_tick = rollout.record.physics_hz // rollout.record.control_hz
+        self._per_tick = rollout.record.rows_per_period
         self.state = self._state()
 
     def advance(self, step: Step, actuated: Twist) -> None:
@@ -169,7 +168,7 @@ class Reader(Decider):
     def __init__(self, rollout: Rollout, periods: int, resets: Mapping[int, Callable[[Pose], None]]) -> None:
         self.step = Step()
         self._rollout, self._periods, self._resets = rollout, periods, resets
-        self._per_tick = rollout.record.physics_hz // rollout.record.control_hz
+        self._per_tick = rollout.record.rows_per_period
 
     def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
         """Return the logged command of a control period, or the end."""

@@ -25,7 +25,7 @@ import numpy.typing as npt
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_numbers, segment_lengths, wrap_angle
 from antdrive.base.types import Bounds, Floats, Point
-from antdrive.robots.spec import RobotSpec
+from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.sim.log.consistency import GRIP, inconsistencies, windowed
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.record import DriveRecord
@@ -132,7 +132,7 @@ def certify(rollout: Rollout) -> Certificate:
         still, moving = _clearances(rollout)
     except FieldError as error:
         return Certificate(False, touched, math.nan, math.nan, (str(error),))
-    clearance = np.minimum(still, moving.min(axis=1, initial=math.inf))
+    clearance = _nearest(still, moving)
     bound = float(_between_steps(rollout, movers, still, moving).min())
     problems = [*_check_digest(rollout), *_check_times(rollout)]
     rollout = dataclasses.replace(rollout, t=_clock(rollout))  # further checks use nominal times
@@ -156,46 +156,48 @@ def closed_form_clearance(rollout: Rollout) -> Floats:
 
     It shares no code with the compiled geometry of the drive, so that each checks the other.
     """
-    still, moving = _clearances(rollout)
+    return _nearest(*_clearances(rollout))
+
+
+def _nearest(still: Floats, moving: Floats) -> Floats:
+    """Return the smaller distance of each row, to what stands (T,) or to a mover (T, M), shape (T,) [m]."""
     return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
 
 
 def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
     """Return the distances from the footprint to the nearest cylinder or wall (T,) and to each mover (T, M) [m]."""
-    foot, world = rollout.record.robot.footprint, rollout.record.world
-    half = np.array([foot.half_length, foot.half_width])
-    rounding, sides = foot.rounding, max(1, len(foot.corners))
-    xmin, ymin, xmax, ymax = world.bounds
-    discs = world.discs
-    x, y, yaw = rollout.pose.T
-    place, unturned = x + 1j * y, np.exp(-1j * yaw)
-    rotation = np.abs(np.stack([np.cos(yaw), np.sin(yaw)]))
-    reach_x = half @ rotation + rounding
-    reach_y = half[::-1] @ rotation + rounding
-    best = np.minimum.reduce([x - reach_x - xmin, xmax - x - reach_x, y - reach_y - ymin, ymax - y - reach_y])
-    if foot.corners:
-        best = _polygon_to_walls(foot.corners, rollout.pose, world.bounds).min(axis=1) - rounding
-
-    def distance(rows: npt.NDArray[np.int64], centres: npt.NDArray[np.complex128], radii: Floats) -> Floats:
-        body = (centres - place[rows, None]) * unturned[rows, None]  # in the robot's frame
-        if foot.corners:
-            return _polygon_to_points(foot.corners, body) - rounding - radii
-        ahead, aside = np.abs(body.real) - half[0], np.abs(body.imag) - half[1]
-        outside = np.sqrt(np.maximum(ahead, 0.0) ** 2 + np.maximum(aside, 0.0) ** 2)
-        return np.asarray(outside + np.minimum(np.maximum(ahead, aside), 0.0) - rounding - radii)
-
-    for block, near in _blocks(rollout.pose[:, :2], foot.radius, discs):
-        centres = (near[:, 0] + 1j * near[:, 1])[None]
+    foot, world, pose = rollout.record.robot.footprint, rollout.record.world, rollout.pose
+    radii, sides = np.array([mover.radius for mover in world.movers]), max(1, len(foot.corners))
+    best = _to_walls(foot, pose, world.bounds).min(axis=1)
+    for block, near in _blocks(pose[:, :2], foot.radius, world.discs):
         for rows in np.array_split(block, 1 + len(block) * len(near) * sides // 1_000_000):
-            best[rows] = np.minimum(best[rows], distance(rows, centres, near[:, 2]).min(axis=1))
-    radii = np.array([mover.radius for mover in world.movers])
-    moving = np.empty((len(x), len(radii)))
-    for rows in np.array_split(np.arange(len(x)), 1 + moving.size * sides // 1_000_000):
-        if not len(radii):
-            break
-        centres = rollout.movers[rows]
-        moving[rows] = distance(rows, centres[..., 0] + 1j * centres[..., 1], radii)
+            best[rows] = np.minimum(best[rows], _to_discs(foot, pose[rows], near[None, :, :2], near[:, 2]).min(axis=1))
+    moving = np.empty((len(pose), len(radii)))
+    for rows in np.array_split(np.arange(len(pose)), 1 + moving.size * sides // 1_000_000) if len(radii) else ():
+        moving[rows] = _to_discs(foot, pose[rows], rollout.movers[rows], radii)
     return np.asarray(best), moving
+
+
+def _to_discs(foot: Footprint, pose: Floats, centres: Floats, radii: Floats) -> Floats:
+    """Return the distances (T, N) [m] from a footprint at poses (T, 3) to discs (N,) at centres (T or 1, N, 2)."""
+    x, y, yaw = (column[:, None] for column in pose.T)
+    body = (centres[..., 0] + 1j * centres[..., 1] - (x + 1j * y)) * np.exp(-1j * yaw)  # in the robot's frame
+    if foot.corners:
+        return _polygon_to_points(foot.corners, body) - foot.rounding - radii
+    ahead, aside = np.abs(body.real) - foot.half_length, np.abs(body.imag) - foot.half_width
+    outside = np.sqrt(np.maximum(ahead, 0.0) ** 2 + np.maximum(aside, 0.0) ** 2)
+    return np.asarray(outside + np.minimum(np.maximum(ahead, aside), 0.0) - foot.rounding - radii)
+
+
+def _to_walls(foot: Footprint, pose: Floats, bounds: Bounds) -> Floats:
+    """Return the distances from a footprint at poses (T, 3) to the left, right, lower and upper wall (T, 4) [m]."""
+    if foot.corners:
+        return _polygon_to_walls(foot.corners, pose, bounds) - foot.rounding
+    x, y, yaw = pose.T
+    half, rotation = np.array([foot.half_length, foot.half_width]), np.abs(np.stack([np.cos(yaw), np.sin(yaw)]))
+    reach_x, reach_y = half @ rotation + foot.rounding, half[::-1] @ rotation + foot.rounding
+    xmin, ymin, xmax, ymax = bounds
+    return np.stack([x - reach_x - xmin, xmax - x - reach_x, y - reach_y - ymin, ymax - y - reach_y], axis=1)
 
 
 def _polygon_to_points(corners: tuple[Point, ...], points: npt.NDArray[np.complex128]) -> Floats:
@@ -248,13 +250,9 @@ def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.
 def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving: Floats) -> Floats:
     """Return a lower bound on the clearance between consecutive rows, shape (T - 1,) [m]; for one row, its clearance."""
     if len(still) < 2:
-        return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
+        return _nearest(still, moving)
     radius = rollout.record.robot.footprint.radius
-    dt = np.diff(_clock(rollout))
-    moved = segment_lengths(rollout.pose[:, :2])
-    turned = np.abs(wrap_angle(np.diff(rollout.pose[:, 2])))
-    speed = np.maximum(*np.abs([rollout.twist[:-1], rollout.twist[1:]]))
-    travel = np.maximum(moved, speed[:, 0] * dt) + radius * np.maximum(turned, speed[:, 1] * dt)
+    travel = travel_between(_clock(rollout), rollout.pose, rollout.twist, radius)
     bound = (still[:-1] + still[1:] - travel) / 2
     if movers:
         t = _clock(rollout)
@@ -263,6 +261,17 @@ def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving
         teleporting = np.minimum(moving[:-1], moving[1:]) - both
         bound = np.minimum(bound, np.where(movers.jumps(t), teleporting, steady).min(axis=1))
     return np.asarray(bound)
+
+
+def travel_between(t: Floats, pose: Floats, twist: Floats, radius: float) -> Floats:
+    """Return how far a point within a radius [m] of the axle's centre moves at most between rows (T,), shape (T - 1,) [m].
+
+    Poses and measured speeds each give a length; the larger counts.
+    """
+    dt, speed = np.diff(t), np.abs(twist)
+    speed = np.maximum(speed[:-1], speed[1:])
+    turned = np.abs(wrap_angle(np.diff(pose[:, 2])))
+    return np.maximum(segment_lengths(pose[:, :2]), speed[:, 0] * dt) + radius * np.maximum(turned, speed[:, 1] * dt)
 
 
 def _clock(rollout: Rollout) -> Floats:
@@ -276,7 +285,7 @@ def _check_agreement(rollout: Rollout, clearance: Floats, bound: float) -> Itera
     if rollout.record.physics:
         yield f"physics: its contacts are no evidence, since {rollout.record.physics}"
     if touched:
-        step = int(rollout.contacts[0, 0])
+        step = rollout.first_contact
         yield f"physics reports {touched} contact points, the first at t = {rollout.t[step]:.3f} s"
         if float(clearance[max(0, step - 1) : step + 2].min()) > CONTACT_SLACK:
             yield (
@@ -336,9 +345,7 @@ def _check_start(rollout: Rollout) -> Iterator[str]:
 
 def _check_motion(rollout: Rollout) -> Iterator[str]:
     """Check that poses follow from the measured speeds up to the first contact, which may throw the robot."""
-    end = len(rollout.t)
-    if len(rollout.contacts):
-        end = max(1, int(rollout.contacts[0, 0]))
+    end = max(1, rollout.first_contact)
     if end < 2:
         return
     pose, twist, dt = rollout.pose[:end], rollout.twist[:end], np.diff(rollout.t[:end])
@@ -449,22 +456,9 @@ def _approach(rollout: Rollout) -> Floats:
 
 def _gaps(rollout: Rollout) -> Floats:
     """Return the distance from the footprint to each cylinder, mover and wall, numbered as contacts, shape (T, N) [m]."""
-    world, foot = rollout.record.world, rollout.record.robot.footprint
-    discs = np.tile(world.discs, (len(rollout.pose), 1, 1))
+    world, foot, pose = rollout.record.world, rollout.record.robot.footprint, rollout.pose
     radii = np.array([mover.radius for mover in world.movers])
-    moving = np.concatenate([rollout.movers, np.tile(radii[:, None], (len(rollout.pose), 1, 1))], axis=2)
-    x, y, yaw = (column[:, None] for column in rollout.pose.T)
-    round_ones = np.concatenate([discs, moving], axis=1)
-    body = (round_ones[..., 0] - x + 1j * (round_ones[..., 1] - y)) * np.exp(-1j * yaw)
-    if foot.corners:
-        apart = np.maximum(_polygon_to_points(foot.corners, body), 0.0) - foot.rounding - round_ones[..., 2]
-        away = _polygon_to_walls(foot.corners, rollout.pose, world.bounds) - foot.rounding
-        return np.concatenate([apart, away], axis=1)
-    ahead, aside = np.abs(body.real) - foot.half_length, np.abs(body.imag) - foot.half_width
-    apart = np.hypot(np.maximum(ahead, 0.0), np.maximum(aside, 0.0)) - foot.rounding - round_ones[..., 2]
-    xmin, ymin, xmax, ymax = world.bounds
-    cos, sin = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
-    reach_x = foot.half_length * cos + foot.half_width * sin + foot.rounding
-    reach_y = foot.half_length * sin + foot.half_width * cos + foot.rounding
-    walls = [x - reach_x - xmin, xmax - x - reach_x, y - reach_y - ymin, ymax - y - reach_y]
-    return np.concatenate([apart, *walls], axis=1)
+    standing = _to_discs(foot, pose, world.discs[None, :, :2], world.discs[:, 2])
+    return np.concatenate(
+        [standing, _to_discs(foot, pose, rollout.movers, radii), _to_walls(foot, pose, world.bounds)], axis=1
+    )

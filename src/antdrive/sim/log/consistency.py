@@ -19,7 +19,7 @@ from antdrive.base.types import Floats
 from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import SAMPLE_RATE, Odometry
 from antdrive.sim.log.ending import false_endings
-from antdrive.sim.log.metrics import driven_length_m, succeeded
+from antdrive.sim.log.metrics import driven_length_m, nearest_on_route, succeeded
 from antdrive.sim.log.record import DECISION, DriveRecord, free_radius
 from antdrive.sim.log.rollout import Rollout, estimates_of
 from antdrive.worlds.route import NEAR, longest_line, short_of_goal
@@ -355,18 +355,12 @@ def _check_followed(rollout: Rollout, end: int) -> Iterator[str]:
     if record.world.movers or len(rollout.route) < 2:
         return
     every = max(1, record.physics_hz // 20)
-    x, y = rollout.pose[:end:every, :2].T[..., None]
-    best = np.full(len(x), np.inf)
-    legs = np.concatenate([rollout.route[:-1], np.diff(rollout.route, axis=0)], axis=1)
-    for some in np.array_split(legs, 1 + len(x) * len(legs) // 1_000_000):
-        ax, ay, dx, dy = some.T
-        share = np.clip(((x - ax) * dx + (y - ay) * dy) / np.maximum(dx * dx + dy * dy, 1e-300), 0.0, 1.0)
-        off = (x - ax - share * dx) ** 2 + (y - ay - share * dy) ** 2
-        best = np.minimum(best, np.sqrt(off.min(axis=1, initial=math.inf)))
+    places = rollout.pose[:end:every, :2]
+    off = np.hypot(*(nearest_on_route(places, rollout.route) - places).T)
     most = record.robot.radius + AWAY_TIME * record.robot.max_speed + NEAR * record.cell
-    if not best.max() <= most:
-        t = float(rollout.t[int(best.argmax()) * every])
-        yield f"route: the robot is {best.max():.3g} m off it at t = {t:.3f} s"
+    if not off.max() <= most:
+        t = float(rollout.t[int(off.argmax()) * every])
+        yield f"route: the robot is {off.max():.3g} m off it at t = {t:.3f} s"
 
 
 OVERSHOOT = 0.03  # measured speeds exceed limits and targets by at most this fraction; genuine drives: 0.2 %
@@ -386,9 +380,7 @@ GRIP = 0.8  # wheels with less friction slide
 
 def inconsistencies(rollout: Rollout) -> Iterator[str]:
     """Yield every contradiction between the record and the rows before the first contact."""
-    end = len(rollout.t)
-    if len(rollout.contacts):
-        end = max(1, int(rollout.contacts[0, 0]))
+    end = max(1, rollout.first_contact)
     yield from _check_record(rollout)
     yield from _check_speeds(rollout, end)
     yield from _check_commands(rollout, end)
@@ -474,7 +466,7 @@ def _check_commands(rollout: Rollout, end: int) -> Iterator[str]:
         yield f"command: beyond the robot's limits {robot.max_speed:g} m/s and {robot.max_yaw_rate:g} rad/s"
     if command[0].any():
         yield "command: row 0 is before the first command and must be 0"
-    period = max(1, record.physics_hz // record.control_hz)
+    period = record.rows_per_period
     for name, values in (("command", command), ("actuated", rollout.actuated)):
         changed = np.flatnonzero(np.diff(values[1:], axis=0).any(axis=1)) + 1
         if (changed % period).any():
@@ -500,7 +492,7 @@ def _check_actuated(rollout: Rollout, end: int) -> Iterator[str]:
             return
     if not len(rollout.actuated):
         return
-    period = max(1, record.physics_hz // record.control_hz)
+    period = record.rows_per_period
     late = round(noise.delay * record.control_hz) * period
     delayed = np.concatenate([np.zeros((min(late, rows), 2)), rollout.command[: max(0, rows - late)]])
     if rows > late:

@@ -107,11 +107,6 @@ class Attribution:
 
 
 def _gap(footprint: Footprint, pose: Any, centre: Any, radius: float) -> float:
-    """Return the distance from a footprint to a disc, 0 or less where they overlap [m]."""
-    dx, dy, yaw = centre[0] - pose[0], centre[1] - pose[1], pose[2]
-    if footprint.corners:
-        place = math.cos(yaw) * dx + math.sin(yaw) * dy, math.cos(yaw) * dy - math.sin(yaw) * dx
-        return -footprint.depth(*place) - radius
-    ahead = abs(math.cos(yaw) * dx + math.sin(yaw) * dy) - footprint.half_length
-    aside = abs(math.cos(yaw) * dy - math.sin(yaw) * dx) - footprint.half_width
-    return math.hypot(max(ahead, 0.0), max(aside, 0.0)) - footprint.rounding - radius
+    """Return the distance from a footprint to a disc, negative where they overlap [m]."""
+    dx, dy, (cos, sin) = centre[0] - pose[0], centre[1] - pose[1], (math.cos(pose[2]), math.sin(pose[2]))
+    return -footprint.depth(cos * dx + sin * dy, cos * dy - sin * dx) - radius

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from antdrive.base.plane import arc_lengths
 from antdrive.base.types import Floats, Point
+from antdrive.sim.log.metrics import nearest_segments
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout, estimates_of
 from antdrive.worlds.route import short_of_goal
@@ -82,9 +83,9 @@ def false_endings(rollout: Rollout) -> Iterator[str]:
 def _check_last_row(rollout: Rollout) -> Iterator[str]:
     """Check that the last row is that of a control period within the time limit, or as late as a contact makes it."""
     record, last = rollout.record, len(rollout.t) - 1
-    period = _rows_per_period(rollout)
+    period = record.rows_per_period
     limit = control_periods(record.time_limit, record.control_hz) * period
-    control = int(rollout.contacts[0, 0]) if len(rollout.contacts) else last
+    control = min(rollout.first_contact, last)
     # The limit ends a drive after its last control period, in which only a decision could have ended it.
     decided = rollout.outcome in (Outcome.SUCCEEDED, Outcome.BLOCKED, Outcome.INVALID_PLAN)
     if control > limit - (period if decided else 0):
@@ -105,9 +106,9 @@ def _check_last_row(rollout: Rollout) -> Iterator[str]:
 def _check_arrival(rollout: Rollout) -> Iterator[str]:
     """Check that the robot did not stand at the goal in an earlier control period."""
     task, end = rollout.record.task, len(rollout.t) - 1
-    stop = int(rollout.contacts[0, 0]) if len(rollout.contacts) else end
+    stop = min(rollout.first_contact, end)
     estimate, tolerance = estimates_of(rollout), task.goal_tolerance - ROUNDING
-    period = _rows_per_period(rollout)
+    period = rollout.record.rows_per_period
     slow = np.flatnonzero(np.abs(rollout.twist[:stop]).max(axis=1) < STOPPED_SPEED)
     for row in slow[(slow > 0) & (slow % period == 0)].tolist():
         if arrived(estimate[row], rollout.twist[row], rollout.command[row], task.goal, tolerance):
@@ -170,7 +171,7 @@ def _check_searched(rollout: Rollout) -> Iterator[str]:
     """Check that the drive ends with a search for a route that failed."""
     record = rollout.record
     failed = record.replans[-1:] if record.replans and not record.replans[-1].solved else ()
-    ends = [round(replan.t * record.control_hz) * _rows_per_period(rollout) for replan in failed]
+    ends = [round(replan.t * record.control_hz) * record.rows_per_period for replan in failed]
     if ends != [len(rollout.t) - 1]:
         yield f"outcome: {rollout.outcome.key}, but the drive does not end with a search that found no route"
 
@@ -205,7 +206,7 @@ def _counted_rows(rollout: Rollout) -> Rows:
     Avoidance does not count. If only turns on the spot add up, the time is that of a full turn more. A robot that brakes for
     its turn counts as turning, as in `StuckClock`.
     """
-    record, period = rollout.record, _rows_per_period(rollout)
+    record, period = rollout.record, rollout.record.rows_per_period
     ends = np.arange(period, len(rollout.t), period)
 
     def by(*rules: str) -> npt.NDArray[np.bool_]:
@@ -242,16 +243,5 @@ def _progress(rollout: Rollout, rows: Rows) -> float:
 
 def _arcs(route: Floats, places: Floats) -> Floats:
     """Return the arc lengths of the nearest points of a route to places (N, 2), shape (N,) [m]."""
-    best, arcs = np.full(len(places), np.inf), np.zeros(len(places))
-    for a, b, arc in zip(route[:-1], route[1:], arc_lengths(route), strict=False):
-        along = b - a
-        share = np.clip((places - a) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
-        off = np.hypot(*(a + share[:, None] * along - places).T)
-        nearer = off < best
-        best[nearer], arcs[nearer] = off[nearer], (arc + share * math.dist(a, b))[nearer]
-    return arcs
-
-
-def _rows_per_period(rollout: Rollout) -> int:
-    """Return the number of rows in a control period."""
-    return max(1, rollout.record.physics_hz // rollout.record.control_hz)
+    feet, segment = nearest_segments(places, route)
+    return np.asarray(arc_lengths(route)[segment] + np.hypot(*(feet - route[segment]).T))

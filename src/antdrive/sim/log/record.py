@@ -12,7 +12,7 @@ import json
 import math
 import re
 import typing
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
@@ -31,6 +31,7 @@ from antdrive.robots.spec import Odometry, RobotSpec
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.policy import Perception
 from antdrive.sim.settings import SETTINGS
+from antdrive.sim.written import Written
 from antdrive.worlds.files.world_file import task_from_dict, task_to_dict
 from antdrive.worlds.limits import MAX_COORDINATE
 from antdrive.worlds.route import LEAD, end_reach
@@ -244,6 +245,12 @@ def _to_task(value: Any) -> Task:
     return task_from_dict(value, "task")
 
 
+def _to_written(value: Any) -> Written:
+    if not isinstance(value, Mapping):
+        raise ValueError(f"must be an object as in a suite, got {_shown(value)}")
+    return Written.read(value)
+
+
 def _to_outcome(value: Any) -> Outcome:
     return Outcome.from_key(value if isinstance(value, str) else _shown(value))
 
@@ -287,6 +294,8 @@ class DriveRecord:
         asked_cell: side of the cells that were asked for [m]; omitted where plans use these
         physics: which body of physics was not in the place of its obstacle, so that its contacts are no evidence; omitted
             where all were
+        written: the scenario as a person wrote it, with the keys of a suite; not covered by the digest; omitted in logs of
+            versions before
         digest: SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
 
     Raises:
@@ -326,6 +335,9 @@ class DriveRecord:
     footprint_margin: float | None = dataclasses.field(default=None, metadata=LATER | REPLAYED)
     asked_cell: float | None = dataclasses.field(default=None, metadata=LATER | CHOSEN)
     physics: str = dataclasses.field(default="", metadata=LATER | REPLAYED)
+    written: Annotated[Written | None, PlainValidator(_to_written)] = dataclasses.field(
+        default=None, metadata=LATER | CLAIMED
+    )
     digest: str | None = dataclasses.field(default=None, metadata=LOGGED)
 
     def __post_init__(self) -> None:
@@ -394,6 +406,11 @@ class DriveRecord:
         return any(setting in {field.name for field in dataclasses.fields(kind)} for kind in (cls, SensingRecord))
 
     @property
+    def rows_per_period(self) -> int:
+        """Number of rows in a control period."""
+        return max(1, self.physics_hz // self.control_hz)
+
+    @property
     def exploring(self) -> bool:
         """Whether the robot had no map."""
         return self.sensing is not None and self.sensing.map == "none"
@@ -456,16 +473,13 @@ class DriveRecord:
 
 def _require_shallow(value: Any) -> None:
     """Refuse values nested deeper than those of any file, which would exhaust the stack of readers."""
-    layer = [value]
+    layer: list[Any] = [[value]]
     for _ in range(MAX_DEPTH):
-        layer = [v for outer in layer for v in _inner(outer) if isinstance(v, dict | list)]
+        values = (value for outer in layer for value in (outer.values() if isinstance(outer, dict) else outer))
+        layer = [value for value in values if isinstance(value, dict | list)]
         if not layer:
             return
     raise ValueError(f"nested deeper than {MAX_DEPTH} levels")
-
-
-def _inner(value: Any) -> Iterable[Any]:
-    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
 
 
 def _missing_key(written: Any, found: Any) -> str:
@@ -491,9 +505,12 @@ def plain_value(value: Any) -> Any:
         return value.key
     if isinstance(value, Task):
         return task_to_dict(value)
+    if isinstance(value, Written):
+        return settings_of(value.plain())
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = [field for field in dataclasses.fields(value) if not _says_nothing(field, getattr(value, field.name))]
-        return {field.name: plain_value(getattr(value, field.name)) for field in fields}
+        fields = [(field, getattr(value, field.name)) for field in dataclasses.fields(value)]
+        said = ((field, v) for field, v in fields if not (field.metadata.get("omit_if_default") and v == field.default))
+        return {field.name: plain_value(v) for field, v in said}
     if isinstance(value, Mapping):
         return {str(key): plain_value(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
@@ -501,10 +518,6 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     return value if isinstance(value, bool | int | float | str | None) else str(value)
-
-
-def _says_nothing(field: dataclasses.Field[Any], value: Any) -> bool:
-    return bool(field.metadata.get("omit_if_default")) and value == field.default
 
 
 def settings_of(values: Any) -> dict[str, Any]:

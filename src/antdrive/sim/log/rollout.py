@@ -263,13 +263,18 @@ class Rollout:
         return self.record.outcome
 
     @property
+    def first_contact(self) -> int:
+        """Row of the first contact; the number of rows without one."""
+        return int(self.contacts[0, 0]) if len(self.contacts) else len(self.t)
+
+    @property
     def digest(self) -> str:
         """SHA-256 of everything that a repetition must reproduce: the arrays, and the record without wall-clock times.
 
         For each array, in the order of this class, the hash takes the line "name dtype shape" and the bytes in C order;
-        then the record's JSON text, without `digest` and `times`.
+        then the record's JSON text, without `UNHASHED`.
         """
-        return self._hash(self.record.to_json(without=("digest", "times")))
+        return self._hash(self.record.to_json(without=UNHASHED))
 
     @property
     def drive_digest(self) -> str:
@@ -449,6 +454,8 @@ class Rollout:
 
 #: Names of the arrays that only lidar logs hold, in the order of the digest, after the others.
 SENSED = ("scans", "scan_rows", "seen", "tracks")
+#: Keys of the record that digests do not cover.
+UNHASHED = ("digest", "times", "written")
 #: Names of the arrays of every log, in the order of the digest.
 ARRAYS = tuple(name for name in FORMS if name not in SENSED)
 

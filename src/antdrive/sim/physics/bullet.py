@@ -69,11 +69,7 @@ class _CStdout:
             self._stream.value, self._real = self._real, None
 
 
-@functools.cache
-def _c_stdout() -> _CStdout:
-    return _CStdout()
-
-
+_c_stdout = functools.cache(_CStdout)
 _idle: list[int] = []  # an idle client for the next world: opening one takes 16 ms
 
 

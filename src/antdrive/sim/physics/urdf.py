@@ -122,7 +122,7 @@ def _caster(robot: RobotSpec, way: int) -> tuple[float, float]:
 def _chassis(robot: RobotSpec, com_drop: float) -> list[str]:
     """Return the chassis: a cylinder, a box or a mesh of the footprint's size, with 92 % of the mass."""
     foot, bottom = robot.footprint, GROUND_CLEARANCE - robot.wheel_radius
-    inertia_z = yaw_inertia(robot)
+    inertia_z = yaw_inertia(robot.mass, robot.footprint)
     xmin, ymin, xmax, ymax = foot.bounds
     size_x, size_y = xmax - xmin, ymax - ymin
     x, y, z = (xmin + xmax) / 2, (ymin + ymax) / 2, bottom + robot.height / 2

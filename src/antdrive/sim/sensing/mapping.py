@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats, Point, Pose
-from antdrive.base.errors import require_positive
+from antdrive.base.errors import require
 from antdrive.robots.clearance import kernel_shape
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.spec import Footprint
@@ -85,8 +85,8 @@ class OccupancyMap:
         self._moving = moving
         self.share = max(1, round(lidar.rate / OFTEN)) if share is None else share
         self.turns = max(1, math.floor(lidar.rate / self.share / EACH_WAY))
-        require_positive("cell", cell)
-        require_positive("horizon", horizon)
+        require("cell", cell, above=0)
+        require("horizon", horizon, above=0)
         self.cell, self.horizon = cell, min(horizon, lidar.max_range)
         self.trust = min(self.horizon, cell / lidar.spacing)
         self.scans = self.layouts = 0

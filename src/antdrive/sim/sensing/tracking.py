@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Pose
-from antdrive.base.errors import FieldError, require_positive
+from antdrive.base.errors import FieldError, require
 from antdrive.robots.control import _kernels_obstacles
 from antdrive.robots.control.pursuit import SQUARE, indexed_obstacles
 from antdrive.robots.lidar import Lidar
@@ -190,7 +190,7 @@ class TrackingPolicy:
 
     def __post_init__(self) -> None:
         for key, value in vars(self).items():
-            require_positive(key, value)
+            require(key, value, above=0)
         if not self.smallest <= self.largest:
             raise FieldError("smallest", f"must be at most largest, {self.largest:g}, got {self.smallest:g}")
 

@@ -34,9 +34,12 @@ def write_world(
         facts["files"] = {"sdf": str(out)}
     elif suffix == ".map":
         facts["files"] = {"map": str(out), **_export_movingai(task, out, resolution)}
-        facts["cell"], facts["corner_in_map"] = resolution or task.cell, _corner(task)
-        if any(facts["corner_in_map"]):
-            x, y, yaw = facts["corner_in_map"]
+        corner = world_to_map(task.frame, [(*task.world.bounds[:2], 0.0)])[
+            0
+        ]  # the world's lower left one in its source map
+        facts["cell"], facts["corner_in_map"] = resolution or task.cell, corner.tolist()
+        if corner.any():
+            x, y, yaw = corner.tolist()
             turned = f", turned by {yaw:.6g} rad" if yaw else ""
             lost.append(
                 f"its pose: .map has no coordinates; its lower left corner is at {format_point((x, y))}{turned}"
@@ -55,11 +58,6 @@ def file_beside(out: Path) -> Path | None:
     if out.suffix.lower() in SDF:
         return None
     return out.with_name(f"{out.name}.scen") if out.suffix.lower() == ".map" else out.with_suffix(".pgm")
-
-
-def _corner(task: Task) -> list[float]:
-    """Return the pose of a world's lower left corner in its source map: x, y [m], yaw [rad]."""
-    return [float(v) for v in world_to_map(task.frame, [(*task.world.bounds[:2], 0.0)])[0]]
 
 
 def _export_movingai(task: Task, out: Path, resolution: float | None) -> dict[str, str]:

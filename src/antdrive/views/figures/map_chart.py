@@ -198,7 +198,7 @@ def draw_contact(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
     """Draw a cross at the first contact and return its legend handles."""
     if not len(rollout.contacts):
         return []
-    row = min(int(rollout.contacts[0, 0]), len(rollout.t) - 1)
+    row = min(rollout.first_contact, len(rollout.t) - 1)
     at = contact_point(scene, rollout.pose[row], int(rollout.contacts[0, 1]), rollout.movers[row])
     drawn: list[Any] = axes.plot(
         *at, "X", ms=9, color=hexed(colours.BAD), mec="white", label="contact", zorder=9, ls="none"

@@ -17,6 +17,7 @@ from antdrive.runs.comparing import distinct, path_text
 from antdrive.sim.log.certificate import Certificate, in_metres
 from antdrive.sim.log.metrics import driven_length_m, tracking_error
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.timeline import Timeline
 from antdrive.views.colours import BAD, CONTACT, GOOD, MUTED, OUTCOME_LABELS, ROUTE, SHELL, START, hexed, label_styles
 from antdrive.views.figures.canvas import (
     BELOW,
@@ -330,5 +331,5 @@ def _draw_over_time(above: Any, below: Any, then: Rollout, now: Rollout, diverge
 def _distances(then: Rollout, now: Rollout) -> tuple[Floats, Floats]:
     """Return times (N,) [s] and the distances between the robots (N,) [m]."""
     moments = np.linspace(0.0, max(float(then.t[-1]), float(now.t[-1])), 600)
-    x, y = (np.interp(moments, now.t, now.pose[:, k]) - np.interp(moments, then.t, then.pose[:, k]) for k in (0, 1))
-    return moments, np.hypot(x, y)
+    apart = Timeline(now).poses(moments) - Timeline(then).poses(moments)
+    return moments, np.hypot(apart[:, 0], apart[:, 1])

@@ -51,7 +51,9 @@ class Camera:
         view[:3, :3] = basis
         view[:3, 3] = -np.array([cx, cy, -cz])
         near, far = float(depth.min()) - cz, float(depth.max()) - cz
-        return cls(view, _perspective(tan_x, tan_y, max(0.5 * near, 1e-2), 1.5 * far + 1.0), size)
+        near, far = max(0.5 * near, 1e-2), 1.5 * far + 1.0
+        clip = [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)]
+        return cls(view, np.array([[1 / tan_x, 0, 0, 0], [0, 1 / tan_y, 0, 0], clip, [0, 0, -1, 0]]), size)
 
     @cached_property
     def full(self) -> Floats:
@@ -124,8 +126,3 @@ def _axes(tilt: float, turned: bool) -> tuple[Floats, Floats, Floats]:
     sky = np.array([0.0, 0.0, 1.0])
     forward = math.cos(tilt) * ahead - math.sin(tilt) * sky
     return right, np.cross(right, forward), -forward
-
-
-def _perspective(tan_x: float, tan_y: float, near: float, far: float) -> Floats:
-    depth = [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)]
-    return np.array([[1 / tan_x, 0, 0, 0], [0, 1 / tan_y, 0, 0], depth, [0, 0, -1, 0]])

@@ -236,7 +236,9 @@ def _tiling(rollouts: Sequence[Rollout], camera: str, size: tuple[int, int]) -> 
     """Return the columns and rows of tiles."""
     count = len(rollouts)
     if camera != "top":
-        return _arrangement(count, size, _proportion(rollouts) if camera == "oblique" else 1.0)
+        bounds = [log.record.task.world.bounds for log in rollouts] if camera == "oblique" else []
+        widest = max([1.0, *((xmax - xmin) / (ymax - ymin) for xmin, ymin, xmax, ymax in bounds)])
+        return _arrangement(count, size, widest)
     extents = [_extent(log) for log in rollouts]
 
     def scale(cols: int) -> float:
@@ -267,12 +269,6 @@ def _scale(extents: Sequence[tuple[float, float]], tile: tuple[int, int]) -> flo
         return min(view[0] / wide, view[1] / tall)
 
     return FILLED * min(map(of, extents))
-
-
-def _proportion(rollouts: Sequence[Rollout]) -> float:
-    """Return width over height of the widest world, at least 1."""
-    bounds = [log.record.task.world.bounds for log in rollouts]
-    return max(1.0, *((xmax - xmin) / (ymax - ymin) for xmin, ymin, xmax, ymax in bounds))
 
 
 def _arrangement(count: int, size: tuple[int, int], proportion: float) -> tuple[int, int]:

@@ -143,10 +143,15 @@ class Compositor:
             self._draw_forecast(frame, places, np.asarray(velocities, dtype=np.float64).reshape(-1, 2))
         self._draw_shadows(frame, np.array([x, y, yaw]), places)
         boxes = self._boxes(x, y, places)
-        bodies = [self._robot_at(x, y, yaw, wheels), *self._movers_at(places)]
+        parts = [Solid(part.mesh, part.colour, placed(*part_pose(part, x, y, yaw, wheels))) for part in self._parts]
+        at = [placed((px, py, 0.0), (0.0, 0.0, 0.0, 1.0)) for px, py in places.tolist()]
+        movers_there = zip(self._mover_meshes, at, strict=True)
+        bodies = [parts, *([Solid(mesh, colours.MOVER, place)] for mesh, place in movers_there)]
         for box in merged([b for b in boxes if b is not None]):
             inside = [body for body, b in zip(bodies, boxes, strict=True) if b is not None and overlap(b, box)]
-            self._put_bodies(frame, box, [solid for body in inside for solid in body])
+            solids = [solid for body in inside for solid in body]
+            drawn = draw_solids(solids, self.camera, box, self.fine, self._light)
+            kernels.put_bodies(frame, *drawn, self.backdrop.depth, box[0], box[1], self.fine, HIDDEN_OPACITY)
         if isinstance(self._lidar_view, OwnMapPainter):
             self._lidar_view.draw_hits(frame, self.backdrop)
         if tracked is not None:
@@ -254,17 +259,6 @@ class Compositor:
         for reach, blur, strength in ((sun, soft, 0.30), (np.zeros(2), float(0.5 * shape.sum()), 0.22)):
             kernels.shade_body(frame, back.visible, back.forward, back.inverse, pose, shape, reach, blur, strength)
 
-    def _robot_at(self, x: float, y: float, yaw: float, wheels: tuple[float, float]) -> list[Solid]:
-        poses = [(part, part_pose(part, x, y, yaw, wheels)) for part in self._parts]
-        return [Solid(part.mesh, part.colour, placed(*pose)) for part, pose in poses]
-
-    def _movers_at(self, places: Floats) -> list[list[Solid]]:
-        turn = (0.0, 0.0, 0.0, 1.0)
-        return [
-            [Solid(mesh, colours.MOVER, placed((x, y, 0.0), turn))]
-            for mesh, (x, y) in zip(self._mover_meshes, places.tolist(), strict=True)
-        ]
-
     def _boxes(self, x: float, y: float, movers: Floats) -> list[Box | None]:
         """Return the pixel boxes of the robot and each mover; None outside the picture."""
         tall = drawn_height(self.scene)
@@ -282,11 +276,6 @@ class Compositor:
         low = np.maximum(np.floor(at.min(axis=1)).astype(int) - 1, 0).tolist()
         high = np.minimum(np.ceil(at.max(axis=1)).astype(int) + 1, self.camera.size).tolist()
         return [(x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None for (x0, y0), (x1, y1) in zip(low, high, strict=True)]
-
-    def _put_bodies(self, frame: Picture, box: Box, solids: list[Solid]) -> None:
-        """Draw bodies within a box and blend them into the frame."""
-        image, depth, seg = draw_solids(solids, self.camera, box, self.fine, self._light)
-        kernels.put_bodies(frame, image, depth, seg, self.backdrop.depth, box[0], box[1], self.fine, HIDDEN_OPACITY)
 
 
 def has_glow(scene: Scene, camera: Camera) -> bool:

@@ -155,7 +155,10 @@ def _lamps(foot: Footprint, middle: Point, half: Point, deck: float) -> list[Mes
 
 def _wheel(radius: float, tread: float, side: int) -> tuple[Mesh, Mesh]:
     """Return a tyre about the y axis, and light lugs and spokes that show its rotation."""
-    tyre = _about_y(_drum(radius, tread))
+    upper = cylinder(radius, -tread / 2, tread / 2, sides=28)
+    flip = np.array([1.0, -1.0, -1.0])
+    drum = join(upper, Mesh(upper.vertices * flip, upper.normals * flip, upper.triangles))  # closed, about the z axis
+    tyre = drum.turned(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]))
     lugs = []
     for k in range(5):
         angle = k * 2 * math.pi / 5
@@ -167,18 +170,6 @@ def _wheel(radius: float, tread: float, side: int) -> tuple[Mesh, Mesh]:
         spoke = box(-0.6 * half, lo, 0.6 * half, hi, 0.15 * radius, 0.86 * radius)
         lugs += [_turned(bar, angle), _turned(spoke, angle)]
     return tyre, join(*lugs)
-
-
-def _drum(radius: float, tread: float) -> Mesh:
-    """Return a closed cylinder about the z axis, centred at the origin."""
-    upper = cylinder(radius, -tread / 2, tread / 2, sides=28)
-    flip = np.array([1.0, -1.0, -1.0])
-    return join(upper, Mesh(upper.vertices * flip, upper.normals * flip, upper.triangles))
-
-
-def _about_y(mesh: Mesh) -> Mesh:
-    """Turn a mesh's z axis to the y axis."""
-    return mesh.turned(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]))
 
 
 def _turned(mesh: Mesh, angle: float) -> Mesh:

@@ -10,6 +10,7 @@ import numpy as np
 from antdrive.base.types import Floats
 from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.timeline import Timeline
 from antdrive.views.scene import Scene, contact_point, jumps
 
 CAMERA_WINDOW = 0.6  # half the window over which a following camera's target is averaged [s]
@@ -34,23 +35,17 @@ class ReplanEvent(NamedTuple):
         return f"{'new route' if self.solved else 'no new route'}: {self.trigger}"
 
 
-class Playback:
+class Playback(Timeline):
     """Run as functions of time [s], interpolated between the rows of its log."""
 
     def __init__(self, rollout: Rollout) -> None:
-        scene = Scene.of(rollout)
+        super().__init__(rollout)
+        scene, rows = Scene.of(rollout), len(rollout.t)
         robot = scene.robot
-        rows = max(1, len(rollout.t))
-        self.t = rollout.t if len(rollout.t) else np.zeros(1)
-        pose = rollout.pose if len(rollout.pose) else np.array([scene.start])
-        self._pose = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
-        self._columns = np.ascontiguousarray(self._pose.T)
-        self._twist = rollout.twist if len(rollout.twist) else np.zeros((rows, 2))
-        self._forward = np.ascontiguousarray(self._twist[:, 0])
-        self._clearance = rollout.clearance if len(rollout.clearance) else np.full(rows, np.nan)
+        self._forward = np.ascontiguousarray(rollout.twist[:, 0])
+        self._clearance, self._movers = rollout.clearance, rollout.movers
         self._least = np.minimum.accumulate(self._clearance)
-        self._driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pose[:, :2], axis=0).T))])
-        self._movers = rollout.movers if len(rollout.movers) else np.empty((rows, 0, 2))
+        self._driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(rollout.pose[:, :2], axis=0).T))])
         self._jumps = jumps(self._movers)
         lidar, hz = rollout.record.robot.lidar, rollout.record.physics_hz
         self._tracks = rollout.tracks.astype(np.float64)
@@ -62,22 +57,17 @@ class Playback:
         for replan in rollout.record.replans:
             route = np.array(replan.route, dtype=np.float64) if replan.solved else route
             self.replans.append(ReplanEvent(replan.t, replan.trigger, replan.solved, route))
-        rim = self._twist[:, 1] * robot.track / 2
+        rim = rollout.twist[:, 1] * robot.track / 2
         steps = np.diff(self.t)
         self._angles = []
-        for speeds in (self._twist[:, 0] - rim, self._twist[:, 0] + rim):
+        for speeds in (rollout.twist[:, 0] - rim, rollout.twist[:, 0] + rim):
             turned = (speeds[1:] + speeds[:-1]) / 2 * steps / robot.wheel_radius
             self._angles.append(np.concatenate([[0.0], np.cumsum(turned)]))
         self._contact_times = self.t[np.clip(rollout.contacts[:, 0].astype(np.int64), 0, rows - 1)]
         self._contact_points = [
-            contact_point(scene, self._pose[step], index, self._movers[step])
+            contact_point(scene, self._columns[:, step], index, self._movers[step])
             for step, index in np.minimum(rollout.contacts[:1, :2].astype(np.int64), (rows - 1, 2**31)).tolist()
         ]
-
-    @property
-    def duration(self) -> float:
-        """Duration of the run [s]."""
-        return float(self.t[-1] - self.t[0])
 
     def slow_motion(self, speed: float) -> tuple[float, float] | None:
         """Return start and end of the slow motion around the first contact [s]; None without a contact."""
@@ -88,13 +78,13 @@ class Playback:
 
     def pose(self, at: float) -> tuple[float, float, float]:
         """Return the robot's x, y [m] and unwrapped heading [rad]."""
-        x, y, yaw = (float(np.interp(at, self.t, column)) for column in self._columns)
+        x, y, yaw = self.poses(at).tolist()
         return x, y, yaw
 
     def camera_target(self, at: float) -> tuple[float, float]:
         """Return the target of a following camera [m]: the robot's mean position around a time."""
         moments = at + CAMERA_WINDOW * np.linspace(-1, 1, 25)
-        x, y = (float(np.interp(moments, self.t, column).mean()) for column in self._columns[:2])
+        x, y = (float(column.mean()) for column in self.poses(moments).T[:2])
         return x, y
 
     def wheels(self, at: float) -> tuple[float, float]:
@@ -104,7 +94,7 @@ class Playback:
 
     def movers(self, at: float) -> Floats:
         """Return the movers' positions (M, 2) [m]; a mover that jumps keeps its position until the row after the jump."""
-        row, fraction = self._between(at)
+        row, fraction = self.between(at)
         here = self._movers[row]
         if fraction == 0.0:
             return np.asarray(here)
@@ -115,24 +105,17 @@ class Playback:
         """Return the movers' velocities (M, 2) [m/s]; 0 during a jump and in a log of one row."""
         if len(self.t) < 2:
             return np.zeros((self._movers.shape[1], 2))
-        row = min(self._row(at), len(self.t) - 2)
+        row = min(self.row(at), len(self.t) - 2)
         step = np.where(self._jumps[row, :, None], 0.0, self._movers[row + 1] - self._movers[row])
         return np.asarray(step / (self.t[row + 1] - self.t[row]))
 
     def tracked(self, at: float) -> Floats:
         """Return the movers tracked by lidar at the last scan (N, 5): x, y [m], velocity [m/s] and radius [m]."""
-        end = int(np.searchsorted(self._tracks[:, 0], self._row(at), side="right"))
-        if not end or self._tracks[end - 1, 0] < self._row(at) - self._scan_rows:
+        end = int(np.searchsorted(self._tracks[:, 0], self.row(at), side="right"))
+        if not end or self._tracks[end - 1, 0] < self.row(at) - self._scan_rows:
             return np.empty((0, 5))
         begin = int(np.searchsorted(self._tracks[:, 0], self._tracks[end - 1, 0], side="left"))
         return self._tracks[begin:end, 2:].copy()
-
-    def _between(self, at: float) -> tuple[int, float]:
-        """Return the last row at or before a time, and the elapsed fraction of the interval to the next row."""
-        row = self._row(at)
-        if row + 1 >= len(self.t) or at <= self.t[row]:
-            return row, 0.0
-        return row, float((at - self.t[row]) / (self.t[row + 1] - self.t[row]))
 
     def replan_count(self, at: float) -> int:
         """Return the number of replans up to a time."""
@@ -148,7 +131,7 @@ class Playback:
 
     def min_clearance(self, at: float) -> float:
         """Return the smallest clearance of all rows up to a time [m]."""
-        return float(self._least[self._row(at)])
+        return float(self._least[self.row(at)])
 
     def driven(self, at: float) -> float:
         """Return the length of the path driven up to a time [m]."""
@@ -158,8 +141,7 @@ class Playback:
         """Return points (N, 2) [m] of the path driven between two times, and the speeds (N,) there [m/s]."""
         count = max(2, math.ceil((until - since) * 60) + 1)
         moments = np.linspace(since, until, count)
-        points = np.column_stack([np.interp(moments, self.t, column) for column in self._columns[:2]])
-        return points, np.interp(moments, self.t, self._forward)
+        return self.poses(moments)[:, :2], np.interp(moments, self.t, self._forward)
 
     def contact(self, at: float) -> tuple[float, float, float] | None:
         """Return the point x, y of the first contact [m] and the time since the latest one [s]; None before any."""
@@ -168,6 +150,3 @@ class Playback:
             return None
         x, y = self._contact_points[0]
         return x, y, float(at - past.max())
-
-    def _row(self, at: float) -> int:
-        return min(max(int(np.searchsorted(self.t, at + 1e-9, side="right")) - 1, 0), len(self.t) - 1)

@@ -27,13 +27,19 @@ from antdrive.runs.statistics.price import prices
 from antdrive.runs.statistics.run_table import HASHES, RunTable
 from antdrive.runs.statistics.significance import FLIPS
 from antdrive.runs.statistics.success import PlannerSuccess, common_medians, success_table
+from antdrive.sim.facts import FACTS
 from antdrive.sim.log.metrics import METRICS
 from antdrive.views.pages.quotes import disagreements, quotes
 from antdrive.views.pages.rendering import percent, percents
 
 DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
-TITLES = {"plan_s": "planning time", "drive_wall_s": "wall time of the drive", "path_length_m": "planned length"}
-UNITS = ("_rad_per_m", "_m", "_s")  # suffixes of metric names
+TITLES = {
+    "plan_s": "planning time",
+    "drive_wall_s": "wall time of the drive",
+    "path_length_m": "planned length",
+    "bound_m": "proved clearance",
+}
+UNITS = ("_rad_per_m", "_m2", "_m", "_s")  # suffixes of names
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,37 +161,34 @@ def known_metrics(paired: PairedRuns, names: Sequence[str]) -> list[str]:
 
 
 def measure_title(name: str) -> str:
-    """Return a measure's heading with its unit."""
-    if name not in METRICS:
-        return name.replace("_", " ")
-    unit = METRICS[name].unit
-    short = next((name.removesuffix(suffix) for suffix in UNITS if name.endswith(suffix)), name)
-    plain = TITLES.get(name, short.replace("_", " "))
-    return plain if unit == "1" else f"{plain} [{unit}]"
+    """Return a column's heading with its unit."""
+    unit = FACTS[name].unit if name in FACTS else ""
+    short = next((name.removesuffix(suffix) for suffix in UNITS if unit and name.endswith(suffix)), name)
+    plain = TITLES.get(name, short.removeprefix("option.").replace("_", " "))
+    return plain if unit in ("", "1") else f"{plain} [{unit}]"
 
 
 NAMED = 3  # planners named in a card
 VALUES = 5  # values of a setting named in a note
 
 
-def headline(summary: CampaignSummary) -> list[tuple[str, str]]:
-    """Return the headline numbers, each with its meaning."""
-    table, paired, rows = summary.table, summary.paired, summary.success
-    runs, good = sum(row.runs for row in rows), int(paired.success.sum())
-    done = ("run" if runs == 1 else "runs") if runs >= summary.size else f"of {summary.size:,} runs done"
-    died = sum(row.outcomes.get("crashed", 0) + row.outcomes.get("planner_fault", 0) for row in rows)
+def headline(table: RunTable, summary: CampaignSummary | None = None) -> list[tuple[str, str]]:
+    """Return the headline numbers, each with its meaning; `summary` compares planners."""
+    runs, good, outcomes = len(table), table.success, table.texts("outcome")
+    size = summary.size if summary is not None else runs
+    bounds, driven = table.numbers("bound_m"), table.numbers("driven_length_m")
+    certified = np.array([value is not None for value in table.columns.get("certified", [None] * runs)])
+    died = outcomes.count("crashed") + outcomes.count("planner_fault")
+    counted = [(len(set(table.texts(name))), name) for name in ("planner", "world", "seed")]
     return [
-        (f"{runs:,}", done),
-        (f"{good:,}", "runs succeeded, over all planners" if len(rows) > 1 else "runs succeeded"),
-        *(_counted(len(paired.planners), "planner"), _counted(len(paired.worlds), "world")),
-        _counted(len(set(table.texts("seed"))), "seed"),
-        *([_best(rows, paired)] if paired.shared.any() else []),
+        (f"{int(good.sum()):,} / {runs:,}", "reached the goal, certified collision-free"),
+        *([(f"{runs:,}", f"of {size:,} runs done")] if runs < size else []),
+        *((f"{count:,}", name if count == 1 else f"{name}s") for count, name in counted),
+        *([_best(summary.success, summary.paired)] if summary is not None and summary.paired.shared.any() else []),
+        *([(f"{bounds[good].min():.3f} m", "smallest certified clearance")] if np.isfinite(bounds[good]).any() else []),
+        *([(f"{np.nansum(driven[certified]):,.1f} m", "driven in total")] if certified.any() else []),
         *([(str(died), "crashes and planner errors")] if died else []),
     ]
-
-
-def _counted(count: int, what: str) -> tuple[str, str]:
-    return f"{count:,}", what if count == 1 else f"{what}s"
 
 
 def _best(rows: Sequence[PlannerSuccess], paired: PairedRuns) -> tuple[str, str]:

@@ -148,15 +148,8 @@ def _number(value: Any) -> float | int | None:
     return int(rounded) if rounded.is_integer() and abs(rounded) < 1e15 else rounded
 
 
-#: Defaults of the optional parts of a page.
-NO_PARTS: Mapping[str, Any] = MappingProxyType(
-    {
-        **dict.fromkeys(("notes", "success", "pairs", "charts", "planners", "styles", "runs", "column_notes"), ()),
-        **dict.fromkeys(("tables", "failures", "detailed"), ()),
-        **dict.fromkeys(("allowances", "summary"), None),
-        **dict.fromkeys(("failed", "undetailed", "uncounted"), 0),
-    }
-)
+#: Parts of a page that only campaigns have.
+NO_PARTS: Mapping[str, Any] = MappingProxyType({"success": (), "pairs": (), "charts": (), "allowances": None})
 
 
 def rendered(template: str, **content: Any) -> str:

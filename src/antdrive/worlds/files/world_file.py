@@ -17,9 +17,9 @@ from pydantic import BaseModel, Field
 
 from antdrive.base.atomic import write_text
 from antdrive.base.caches import cached
-from antdrive.base.checks import OneLine, SchemaVersion, check, resolve, schema_of, suggest, yaml_number
+from antdrive.base.checks import OneLine, SchemaVersion, check, file_schema, resolve, suggest, yaml_number
 from antdrive.base.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
-from antdrive.base.errors import FieldError, input_error
+from antdrive.base.errors import FieldError, InputError, input_error, visible
 from antdrive.base.files import format_size
 from antdrive.base.records import STRICT
 from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD, Coordinate, Size
@@ -114,17 +114,18 @@ def _files_of(catalog: Path) -> Mapping[str, Path]:
     return dict(sorted((path.stem, path) for path in catalog.glob("*.yaml")))
 
 
-def load_task(world: str | os.PathLike[str], name: str | None = None) -> Task:
+def load_task(world: str | os.PathLike[str], name: str | None = None, home: Path | None = None) -> Task:
     """Load a task from a world file or the catalogue.
 
     Args:
         world: a catalogue name or a path; catalogue names take precedence
         name: one of the file's `tasks`; None: the world's own start and goal
+        home: base of relative paths; None: the working directory
 
     Raises:
         InputError: the world or the task does not exist, or the file is invalid.
     """
-    tasks = _tasks_of(world)
+    tasks = _tasks_of(world, home)
     if name not in tasks:
         known = [known for known in tasks if known is not None]
         hint = suggest(name or "", known) if known else "the world has no named tasks"
@@ -133,10 +134,7 @@ def load_task(world: str | os.PathLike[str], name: str | None = None) -> Task:
 
 
 def load_tasks(world: str | os.PathLike[str]) -> Mapping[str, Task]:
-    """Load the tasks under a world's key `tasks`, by name.
-
-    Args:
-        world: as for `load_task`
+    """Load the tasks under a world's key `tasks`, by name; the world is that of `load_task`.
 
     Raises:
         InputError: the world does not exist, or its file is invalid.
@@ -144,12 +142,12 @@ def load_tasks(world: str | os.PathLike[str]) -> Mapping[str, Task]:
     return {name: task for name, task in _tasks_of(world).items() if name is not None}
 
 
-def _tasks_of(world: str | os.PathLike[str]) -> Mapping[str | None, Task]:
+def _tasks_of(world: str | os.PathLike[str], home: Path | None = None) -> Mapping[str | None, Task]:
     """Return a world's tasks by name; None is the key of its own start and goal."""
     try:
-        path = resolve("world", world, list_worlds())
+        path = resolve("world", world, list_worlds(), home)
     except FieldError as error:
-        raise input_error(error.problem) from None
+        raise InputError(visible(error.problem), error.key) from None
     if path.suffix.lower() in FOREIGN_SUFFIXES:
         barn = " --barn" if _BARN_NAME.fullmatch(path.name) else ""  # without it another task would be imported
         raise input_error(str(path), f"not a world file; convert it with: antdrive worlds import {path}{barn}")
@@ -250,11 +248,7 @@ def task_to_dict(task: Task) -> dict[str, Any]:
 
 
 def task_from_dict(data: Mapping[str, Any], source: str = "task") -> Task:
-    """Return the task in plain data: the inverse of `task_to_dict`.
-
-    Args:
-        data: mappings, lists, numbers and texts with the keys of a world file
-        source: name of the data in error messages
+    """Return the task in plain `data`: the inverse of `task_to_dict`. `source` names the data in errors.
 
     Raises:
         InputError: the data are invalid.
@@ -264,10 +258,7 @@ def task_from_dict(data: Mapping[str, Any], source: str = "task") -> Task:
 
 def task_schema() -> dict[str, Any]:
     """Return the JSON Schema of world files, for editors."""
-    schema = schema_of(WorldFile)
-    required = [key for key in schema["required"] if key != "name"]
-    draft = "https://json-schema.org/draft/2020-12/schema"
-    return {"$schema": draft, **schema, "required": required, "title": "antdrive world"}
+    return file_schema(WorldFile, "antdrive world")
 
 
 def _to_task(document: Document, entry: WorldFile | None = None) -> Task:

@@ -20,11 +20,7 @@ BARN_CELL = 0.15
 
 
 def import_barn(path: str | os.PathLike[str], *, cell: float = BARN_CELL) -> Task:
-    """Import a world of the BARN set with the challenge's start, goal and tolerance.
-
-    Args:
-        path: the set's `.world` file
-        cell: the task's grid resolution [m]
+    """Import a `.world` file of the BARN set with the challenge's start, goal and tolerance, and a grid of cells of `cell` [m].
 
     Raises:
         InputError: the file is unreadable or not a world of static upright cylinders.

@@ -73,12 +73,7 @@ class CellMap:
         return x, y, x + cols * self.resolution, y + rows * self.resolution
 
     def cell_at(self, x: float, y: float) -> tuple[int, int] | None:
-        """Return the (row, col) of the cell that contains a point; None outside the map.
-
-        Args:
-            x: world coordinate [m]
-            y: world coordinate [m]
-        """
+        """Return the (row, col) of the cell that contains the point (`x`, `y`) of the world [m]; None outside the map."""
         col = math.floor((x - self.origin[0]) / self.resolution)
         row = math.floor((y - self.origin[1]) / self.resolution)
         rows, cols = self.free.shape
@@ -101,11 +96,9 @@ class Cover:
 
 
 def cell_map(world: World, resolution: float) -> CellMap:
-    """Rasterise a world into a map. A cell is blocked if a disc or a wall reaches into it by more than 1 nm.
+    """Rasterise a world into a map of cells with sides of `resolution` [m]; movers do not count.
 
-    Args:
-        world: the obstacles and walls; movers do not count
-        resolution: side of a cell [m]
+    A cell is blocked if a disc or a wall reaches into it by more than 1 nm.
 
     Raises:
         InputError: the resolution is not positive or cuts the world into too many cells.

@@ -16,14 +16,10 @@ DYNABARN_CELL = 0.25  # [m]
 
 
 def import_dynabarn(path: str | os.PathLike[str], *, cell: float = DYNABARN_CELL) -> list[Task]:
-    """Import the worlds of a DynaBARN set, one task each.
+    """Import the worlds of a DynaBARN set, one task each, with grids of cells of `cell` [m].
 
     The file is JSON: a list of mappings with name, bounds, start, goal, goal_tolerance and movers. Each mover has radius,
     length, period, loop and keyframes_t_x_y. The tasks have the challenge's time limit of 100 s.
-
-    Args:
-        path: the JSON file
-        cell: the tasks' grid resolution [m]
 
     Raises:
         InputError: the file is unreadable or not a DynaBARN set.

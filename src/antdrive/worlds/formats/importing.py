@@ -67,11 +67,7 @@ IMPORTS: Mapping[str, Format] = MappingProxyType(
 
 
 def import_format(path: str | os.PathLike[str], *, barn: bool = False) -> Format:
-    """Return a file's format, by its suffix.
-
-    Args:
-        path: the file; it need not exist
-        barn: whether an SDF world belongs to the BARN set
+    """Return a file's format, by its suffix; the file need not exist. `barn`: an SDF world belongs to the BARN set.
 
     Raises:
         InputError: the suffix has no import format.

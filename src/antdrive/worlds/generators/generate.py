@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.caches import cached
-from antdrive.base.errors import FieldError, input_error, require_positive
+from antdrive.base.errors import FieldError, input_error, require
 from antdrive.base.types import Point
+from antdrive.worlds import _kernels_turns
 from antdrive.worlds.formats.barn import BARN_BOUNDS, BARN_CELL, BARN_GOAL, BARN_START, BARN_TOLERANCE
 from antdrive.worlds.geometry import point_clearance
 from antdrive.worlds.grid import DIRECTIONS, Grid, rasterise
@@ -63,7 +64,7 @@ def forest(
         FieldError: an argument is out of its range, or no attempt succeeded (key "forest").
     """
     for key, value in (("spacing", spacing), ("robot_radius", robot_radius), ("cell", cell)):
-        require_positive(key, value)
+        require(key, value, above=0)
     inset = robot_radius + cell  # start and goal are one cell away from contact with the walls
     rule = _Rule(size, radius, spacing, clearance, gap, tries, inset)
     if not 0 <= count <= 10_000:
@@ -103,9 +104,8 @@ class _Rule:
         if not 0.001 <= low <= high:
             raise FieldError("radius", f"must be (smallest, largest) of at least a millimetre, got {self.radius}")
         for key, value in (("clearance", self.clearance), ("gap", self.gap or 0.0)):
-            if not (math.isfinite(value) and value >= 0):
-                raise FieldError(key, f"must be at least 0, got {value:g}")
-        _require_tries(self.tries)
+            require(key, value, at_least=0)
+        require("tries", self.tries, at_least=1)
         if not (math.isfinite(self.size) and self.size > 2 * self.inset):
             raise FieldError("size", f"must be greater than {2 * self.inset:g} m for this robot, got {self.size:g}")
 
@@ -142,11 +142,6 @@ def _distance(disc: Disc, point: Point) -> float:
     return math.dist((disc.x, disc.y), point) - disc.radius
 
 
-def _require_tries(tries: int) -> None:
-    if tries < 1:
-        raise FieldError("tries", f"must be at least 1, got {tries}")
-
-
 def barn(
     rng: np.random.Generator,
     fill: float = 0.20,
@@ -176,13 +171,10 @@ def barn(
     Raises:
         FieldError: an argument is out of its range, or no attempt succeeded (key "barn").
     """
-    if not 0 <= fill < 1:
-        raise FieldError("fill", f"must be at least 0 and less than 1, got {fill:g}")
-    if rounds < 0:
-        raise FieldError("rounds", f"must be at least 0, got {rounds}")
-    if not 0 < robot_radius <= 2:
-        raise FieldError("robot_radius", f"must be greater than 0 and at most 2, got {robot_radius:g}")
-    _require_tries(tries)
+    require("fill", fill, at_least=0, below=1)
+    require("rounds", rounds, at_least=0)
+    require("robot_radius", robot_radius, above=0, at_most=2)
+    require("tries", tries, at_least=1)
     source = f"the cellular automaton of BARN (Perille et al. 2020), fill {fill:g}, {rounds} rounds"
     for _ in range(tries):
         field = grow_field(rng, fill, rounds)
@@ -227,10 +219,8 @@ def office(
     """
     if not all(0 < width <= 5 for width in doors):
         raise FieldError("doors", f"must be greater than 0 and at most 5, got {min(doors):g} to {max(doors):g}")
-    if not 1 <= corridor <= 10:
-        raise FieldError("corridor", f"must be at least 1 and at most 10, got {corridor:g}")
-    if not 0.02 <= radius <= 0.2:
-        raise FieldError("radius", f"must be at least 0.02 and at most 0.2, got {radius:g}")
+    require("corridor", corridor, at_least=1, at_most=10)
+    require("radius", radius, at_least=0.02, at_most=0.2)
     (width, height), side = (40.0, 25.0), 40.0 / (len(doors) / 2)
     low, high = (height - corridor) / 2, (height + corridor) / 2
     widths = rng.permutation(doors)
@@ -323,18 +313,8 @@ def _connected(grid: Grid, task: Task) -> bool:
     ends = [task.start[:2], task.goal]
     if not (point_clearance(task.world, ends) > grid.inflate).all():
         return False
-    start, goal = (grid.cell_at(*end) for end in ends)
-    todo, visited = [start], {start}
-    while todo:
-        cell = todo.pop()
-        if cell == goal:
-            return True
-        for bit, (dr, dc) in enumerate(DIRECTIONS):
-            there = cell[0] + dr, cell[1] + dc
-            if grid.moves[cell] >> bit & 1 and there not in visited:
-                visited.add(there)
-                todo.append(there)
-    return False
+    start, goal = (row * grid.shape[1] + col for row, col in (grid.cell_at(*end) for end in ends))
+    return bool(_kernels_turns.led_to(grid.graph, start)[goal])
 
 
 Picture: TypeAlias = npt.NDArray[np.bool_]  # (rows, columns), True where filled

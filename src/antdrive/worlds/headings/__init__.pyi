@@ -1,4 +1,3 @@
 from .rotations import Outline as Outline
-from .rotations import free_headings as free_headings
 from .rotations import sweep_clearance as sweep_clearance
 from .rotations import turn_clear as turn_clear

@@ -6,7 +6,6 @@ bounds. Touching, within rounding, is not free.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +13,6 @@ import numpy.typing as npt
 
 from antdrive.base.types import Floats
 from antdrive.worlds.headings import _kernels_headings as kernels
-
-TURN = 2 * math.pi
 
 
 class Outline(NamedTuple):
@@ -32,45 +29,13 @@ class Outline(NamedTuple):
     reach: float
 
 
-def free_headings(x: float, y: float, outline: Outline, discs: Floats, bounds: npt.ArrayLike) -> Floats:
-    """Return the intervals of heading at which the outline touches nothing, (N, 2) [rad].
-
-    Sorted by start in [0, 2π); ends may exceed 2π. One row (0, 2π) if all headings are free. The ends of any other
-    interval are not free.
-
-    Args:
-        x: position of the outline's origin [m]
-        y: position of the outline's origin [m]
-        outline: the outline
-        discs: x, y and radius of each disc (M, 3) [m]
-        bounds: the walls: xmin, ymin, xmax, ymax [m]
-    """
-    blocked = kernels.blocked_headings(
-        x, y, outline.corners, outline.reach, discs, np.asarray(bounds, dtype=np.float64)
-    )
-    if not len(blocked):
-        return np.array([[0.0, TURN]])
-    starts, ends = blocked[np.argsort(blocked[:, 0])].T
-    ends = np.maximum.accumulate(ends)
-    lows = np.maximum(np.append(-TURN, ends[:-1]), ends[-1] - TURN)  # the last blocked interval may reach beyond 2π
-    gaps = np.stack([lows, starts], axis=1)[lows < starts]
-    gaps[gaps[:, 0] < 0] += TURN
-    return np.asarray(gaps[np.argsort(gaps[:, 0])])
-
-
 def turn_clear(
     x: float, y: float, yaw: float, turn: float, outline: Outline, discs: Floats, bounds: npt.ArrayLike
 ) -> bool:
-    """Return whether the outline touches nothing on a whole turn on the spot.
+    """Return whether the outline touches nothing on a whole turn on the spot at (x, y) [m].
 
-    Args:
-        x: position of the outline's origin [m]
-        y: position of the outline's origin [m]
-        yaw: heading before the turn [rad]
-        turn: signed angle, counter-clockwise; 0 checks the heading alone [rad]
-        outline: the outline
-        discs: x, y and radius of each disc (M, 3) [m]
-        bounds: the walls: xmin, ymin, xmax, ymax [m]
+    The signed angle `turn` begins at the heading `yaw`; 0 checks the heading alone [rad]. `discs` (M, 3) are x, y and radius,
+    `bounds` the walls: xmin, ymin, xmax, ymax [m].
     """
     walls = np.asarray(bounds, dtype=np.float64)
     return bool(kernels.turn_clear(x, y, yaw, turn, outline.corners, outline.reach, discs, walls))
@@ -81,17 +46,8 @@ def sweep_clearance(
 ) -> float:
     """Return the distance from the outline, swept along a line at constant heading, to the nearest disc or wall [m].
 
-    0 or negative if it touches; the magnitude is then a bound on the depth, not the exact depth.
-
-    Args:
-        x0: start of the outline's origin [m]
-        y0: start of the outline's origin [m]
-        x1: end of the outline's origin [m]
-        y1: end of the outline's origin [m]
-        yaw: heading, independent of the line's direction [rad]
-        outline: the outline
-        discs: x, y and radius of each disc (M, 3) [m]
-        bounds: the walls: xmin, ymin, xmax, ymax [m]
+    0 or negative if it touches; the magnitude is then a bound on the depth, not the exact depth. The outline's origin goes from
+    (x0, y0) to (x1, y1) [m]. Its heading `yaw` is independent of that line [rad]. `discs` and `bounds` are as for `turn_clear`.
     """
     walls = np.asarray(bounds, dtype=np.float64)
     return float(kernels.sweep_clearance(x0, y0, x1, y1, yaw, outline.corners, outline.reach, discs, walls))

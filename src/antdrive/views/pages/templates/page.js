@@ -7,7 +7,7 @@
   for (const raw of data.columns) {
     if (raw.numbers) {
       const keys = Float64Array.from(raw.numbers, (v) => (v === null ? NaN : v));
-      columns.set(raw.name, { numeric: true, keys, text: (row) => (raw.numbers[row] === null ? "–" : raw.digits === undefined ? String(raw.numbers[row]) : raw.numbers[row].toFixed(raw.digits)), digits: raw.digits });
+      columns.set(raw.name, { numeric: true, keys, text: (row) => (raw.numbers[row] === null ? "–" : String(raw.numbers[row])) });
       continue;
     }
     const places = raw.places || raw.texts.map((_, k) => k), order = raw.texts.map((_, k) => k).sort((a, b) => collator.compare(raw.texts[a], raw.texts[b]));
@@ -27,7 +27,7 @@
 
   // The runs: a sorted list of row numbers; the document holds the visible ones only.
   const HEIGHT = 34, box = $("#runs"), body = $("tbody", box), heads = [];
-  const shown = (name, row) => { const value = text(name, row); return columns.get(name).numeric && columns.get(name).digits === undefined && /[._]/.test(name) && value !== "–" ? String(Number(Number(value).toPrecision(4))) : value; };
+  const shown = (name, row) => { const value = text(name, row); return columns.get(name).numeric && /[._]/.test(name) && value !== "–" ? String(Number(Number(value).toPrecision(4))) : value; };
   let sorted = Uint32Array.from({ length: data.rows }, (_, k) => k), visible = sorted, drawn = "";
   const cell = (name, row) => {
     const found = make("td", undefined, columns.get(name).numeric ? "n" : "");

@@ -1,0 +1,430 @@
+"""A scenario as a person writes it: an entry of a suite, a point of a campaign, a command line, or a log's record."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import shlex
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from antdrive.base.checks import resolve, show, suggest
+from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import file_name
+from antdrive.planners.user_code import is_user_code, record_name
+from antdrive.sim.settings import SETTINGS
+
+if TYPE_CHECKING:
+    from antdrive.planners import Planner
+    from antdrive.robots import RobotSpec
+    from antdrive.sim.log.record import DriveRecord
+    from antdrive.sim.scenario import Scenario
+    from antdrive.worlds import Task
+
+#: Returns the error for a key and its problem, with the key's place: a file and its line, or an option.
+ErrorAt: TypeAlias = Callable[[str, str], InputError]
+
+
+def _as_keys(key: str, problem: str) -> InputError:
+    """Return an error whose place is the key itself."""
+    return FieldError(key, problem).as_input()
+
+
+@contextlib.contextmanager
+def placed(at: ErrorAt | None) -> Iterator[None]:
+    """Give errors within this block the places of their keys; None leaves them as they are."""
+    try:
+        yield
+    except (FieldError, InputError) as error:
+        said = isinstance(error, InputError) and not error.key  # the message has a place
+        raise error if at is None or said else at(error.key, error.problem) from None
+
+
+def unchosen(s: Scenario) -> Scenario:
+    """Leave a margin that is to be chosen at zero, which suffices for checks."""
+    return s
+
+
+_KINDS: Mapping[str, Any] = {
+    "world": (str, dict),
+    "planner": (str, dict),
+    "start": (list, tuple),
+    "goal": (list, tuple),
+    "task": str,
+    "robot": str,
+    "seed": int,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Written:
+    """Plain data of a scenario; files are relative to a home folder, by default the working directory.
+
+    Attributes:
+        world: a world of the catalogue, a world file, or {generate: KIND, seed: 7} with the generator's options
+        task: one of the world's tasks; None: its own start and goal
+        start: another start [x, y, yaw], in metres and radians
+        goal: another goal [x, y], in metres
+        planner: a registered name, FILE.py:CLASS, or MODULE:CLASS
+        options: the planner's options
+        robot: a robot of the catalogue, or a robot file
+        settings: the settings that are given, by key
+        seed: seed of all random numbers
+    """
+
+    world: str | Mapping[str, Any]
+    task: str | None = None
+    start: Sequence[float] | None = None
+    goal: Sequence[float] | None = None
+    planner: str = "ants"
+    options: Mapping[str, Any] = field(default_factory=dict)
+    robot: str = "turtlebot"
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    seed: int = 0
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any]) -> Written:
+        """Return the scenario of plain data with the keys of a suite, and `seed`.
+
+        Raises:
+            FieldError: a value has another type, or a key is unknown.
+        """
+        own = {one.name for one in dataclasses.fields(cls)} - {"settings", "options"}
+        planner = data.get("planner", "ants")
+        options = {} if isinstance(planner, str) else dict(planner)
+        name = planner if isinstance(planner, str) else options.pop("name", None)
+        if not isinstance(name, str):
+            raise FieldError("planner.name", "missing; write the planner's name, or FILE.py:CLASS or MODULE:CLASS")
+        settings = {key: value for key, value in data.items() if key not in own}
+        known = {one.key for one in SETTINGS.values()}
+        for key in settings:
+            if key not in known:
+                raise FieldError(key, f"unknown key; {suggest(key, [*own, *known])}")
+        given = {key: data[key] for key in own & data.keys()}
+        for key, value in given.items():
+            wanted = _KINDS.get(key)
+            if wanted is not None and not isinstance(value, wanted):
+                raise FieldError(key, f"has another type, got {show(value)}")
+        for key, count in (("start", 3), ("goal", 2)):
+            ends = given.get(key, [0.0] * count)
+            if len(ends) != count or not all(isinstance(number, int | float) for number in ends):
+                raise FieldError(key, f"must be {count} numbers, got {show(ends)}")
+        return cls(**{**given, "planner": name, "options": options, "settings": settings})
+
+    def plain(self) -> dict[str, Any]:
+        """Return plain data for `read`."""
+        places = {key: getattr(self, key) for key in ("world", "task", "start", "goal")}
+        return {
+            **{key: value for key, value in places.items() if value is not None},
+            "planner": {"name": self.planner, **self.options} if self.options else self.planner,
+            "robot": self.robot,
+            **self.settings,
+            "seed": self.seed,
+        }
+
+    def scenario(
+        self,
+        home: Path | None = None,
+        at: ErrorAt | None = None,
+        *,
+        choose: Callable[[Scenario], Scenario] = unchosen,
+        **made: Any,
+    ) -> Scenario:
+        """Return the scenario.
+
+        Args:
+            home: base of relative paths
+            at: returns the error for a key; None: errors are those of the values
+            choose: chooses the margin `auto`
+            made: fields of the scenario that exist already, such as its task; the words of those without are empty
+
+        Raises:
+            InputError: something does not exist, or a value is invalid.
+        """
+        from antdrive.sim.forms import scenario_fields
+        from antdrive.sim.scenario import Scenario
+
+        auto = self.settings.get("margin") == "auto" and "margin" not in made
+        with placed(at):
+            fields = scenario_fields({**self.settings, **({"margin": 0.0} if auto else {})})
+            fields |= {"seed": self.seed, "planner_name": record_name(self.planner), **made}
+            for name, load in (("task", self.load_task), ("planner", self.load_planner), ("robot", self.load_robot)):
+                if name not in fields:
+                    fields[name] = load(home)
+            here = self if home is None else self.seen_from_here(home)
+            options = {
+                key: getattr(fields["planner"], key, value) for key, value in self.options.items()
+            }  # no longer text
+            here = dataclasses.replace(here, options=options)
+            words = {"task": here.world, "planner": here.planner, "robot": here.robot}
+            said = {name: (fields[name], here._words(name)) for name, word in words.items() if word}
+            s = Scenario(**fields, said=said)
+            return choose(s) if auto else s
+
+    def check_names(self, home: Path | None, at: ErrorAt) -> None:
+        """Check that everything named exists, without reading worlds and robots or running user code.
+
+        Args:
+            home: base of relative paths
+            at: returns the error for a key
+        """
+        from antdrive.robots.robot_file import list_robots
+        from antdrive.worlds.files.world_file import list_worlds
+
+        with placed(at):
+            if isinstance(self.world, str):
+                resolve("world", self.world, list_worlds(), home)
+            resolve("robot", self.robot, list_robots(), home)
+            if not is_user_code(self.planner):
+                self.load_planner()
+
+    def load_task(self, home: Path | None = None) -> Task:
+        """Load the world with start and goal; `home` is the base of relative paths."""
+        from antdrive.worlds import load_task
+
+        task = load_task(self.world, self.task, home) if isinstance(self.world, str) else self._generated(self.world)
+        ends = {"start": self.start, "goal": self.goal}
+        given = {key: tuple(value) for key, value in ends.items() if value is not None}
+        return dataclasses.replace(task, **given) if given else task  # type: ignore[arg-type]
+
+    def _generated(self, world: Mapping[str, Any]) -> Task:
+        from antdrive.sim.forms import option_text
+        from antdrive.worlds.generators.generate import generated
+
+        options = dict(world)
+        kind, seed = options.pop("generate", None), options.pop("seed", 0)
+        if not isinstance(kind, str):
+            raise FieldError("world", "write a file, a name of the catalogue, or {generate: forest, seed: 7}")
+        if self.task is not None:
+            raise FieldError("task", "a random world has no named tasks")
+        if type(seed) is not int or not 0 <= seed < 2**63:
+            raise FieldError("world.seed", f"must be a whole number of at least 0, got {show(seed)}")
+        try:
+            return generated(kind, seed, tuple((key, option_text(value)) for key, value in options.items()))
+        except InputError as error:
+            raise FieldError("world", str(error)) from None
+
+    def load_planner(self, home: Path | None = None) -> Planner:
+        """Load the planner with its options; `home` is the folder of user code."""
+        from antdrive.planners import load_planner
+
+        return load_planner(self.planner, home, **self.options)
+
+    def load_robot(self, home: Path | None = None) -> RobotSpec:
+        """Load the robot; `home` is the base of relative paths."""
+        from antdrive.robots import load_robot
+
+        return load_robot(self.robot, home)
+
+    def _words(self, name: str) -> dict[str, Any]:
+        """Return the fields that name a scenario's task, planner or robot."""
+        keys = {"task": ("world", "task", "start", "goal"), "planner": ("planner", "options"), "robot": ("robot",)}
+        return {key: getattr(self, key) for key in keys[name]}
+
+    @classmethod
+    def of(cls, s: Scenario) -> Written:
+        """Return a scenario as written, else as a person would write it with files named after its parts."""
+        from antdrive.sim.forms import written
+
+        words: dict[str, Any] = {}
+        for name, named in (("task", _named_task), ("planner", _named_planner), ("robot", _named_robot)):
+            made, said = s.said.get(name, (None, {}))
+            words |= said if made is getattr(s, name) else named(getattr(s, name), s.planner_label)
+        settings = written(lambda name: getattr(s, name)) | ({} if s.chosen is None else {"margin": "auto"})
+        return cls(**words, settings={key: value for key, value in settings.items() if key != "seed"}, seed=int(s.seed))
+
+    def command(self) -> str | None:
+        """Return the command that drives the scenario; None if the command line has no option for a setting."""
+        from antdrive.sim.forms import option_text, setting_words
+
+        settings = setting_words(self.settings)
+        if settings is None:
+            return None
+        options = [word for key, one in self.options.items() for word in ("--set", f"planner.{key}={option_text(one)}")]
+        world, before = (self.world, "") if isinstance(self.world, str) else _generating(dict(self.world))
+        places = {"task": self.task, "start": self.start, "goal": self.goal}
+        ends = [
+            f"--{key}={option_text(list(at) if key != 'task' else at)}" for key, at in places.items() if at is not None
+        ]
+        words = ["antdrive", "run", world, *ends, "--planner", self.planner, *options, "--robot", self.robot]
+        return before + shlex.join([*words, *settings, "--seed", str(self.seed)])
+
+    def moved(self, rename: Callable[[str], str]) -> Written:
+        """Return the same with other names for its files."""
+        from antdrive.robots import list_robots
+        from antdrive.worlds import list_worlds
+
+        world = self.world if not isinstance(self.world, str) or self.world in list_worlds() else rename(self.world)
+        source, mark, name = self.planner.rpartition(":")
+        planner = f"{rename(source)}{mark}{name}" if source.endswith(".py") else self.planner
+        robot = self.robot if self.robot in list_robots() else rename(self.robot)
+        return dataclasses.replace(self, world=world, planner=planner, robot=robot)
+
+    def seen_from_here(self, home: Path, *, anywhere: bool = False) -> Written:
+        """Return the same with files relative to the working directory, or with whole paths; modules beside are files."""
+
+        def shown(name: str) -> str:
+            path, here = (home / name).resolve(), Path.cwd()
+            return str(path if anywhere or not path.is_relative_to(here) else path.relative_to(here))
+
+        source, _, name = self.planner.rpartition(":")
+        beside = home / f"{source}.py"
+        moving = anywhere or home.resolve() != Path.cwd()
+        if source and moving and not source.endswith(".py") and beside.is_file():
+            return dataclasses.replace(self, planner=f"{beside.name}:{name}").moved(shown)
+        return self.moved(shown)
+
+
+def _named_task(task: Task, _: str) -> dict[str, Any]:
+    """Return a task's name in the catalogue, with its start and goal if they differ; else a file's name."""
+    from antdrive.sim.log.record import canonical_hash
+
+    usual = _catalogue_task(task.world.name)
+    if usual is not None:
+        ends = {key: getattr(task, key) for key in ("start", "goal") if getattr(task, key) != getattr(usual, key)}
+        try:
+            usual = dataclasses.replace(usual, **ends)
+        except FieldError:
+            usual = None
+        if usual is not None and canonical_hash(usual) == canonical_hash(task):
+            return {"world": task.world.name, **{key: list(value) for key, value in ends.items()}}
+    return {"world": f"{file_name(task.world.name)}.yaml"}
+
+
+@cache
+def _catalogue_task(name: str) -> Task | None:
+    from antdrive.worlds import list_worlds, load_task
+
+    return load_task(name) if name in list_worlds() else None
+
+
+def _named_robot(robot: RobotSpec, _: str) -> dict[str, Any]:
+    """Return a robot's name in the catalogue, else a file's name."""
+    from antdrive.robots import list_robots, load_robot
+    from antdrive.sim.log.record import canonical_hash
+
+    same = robot.name in list_robots() and canonical_hash(load_robot(robot.name)) == canonical_hash(robot)
+    return {"robot": robot.name if same else f"{file_name(robot.name)}.yaml"}
+
+
+def _named_planner(planner: Planner | Mapping[str, Any], label: str) -> dict[str, Any]:
+    """Return a planner's registered name, else that of its class, and the options that differ from the registered ones."""
+    from antdrive.planners import list_planners
+    from antdrive.sim.log.record import settings_of
+
+    usual = list_planners().get(label)
+    known = {} if usual is None else settings_of(usual)
+    given = settings_of(planner) if isinstance(planner, Mapping) or dataclasses.is_dataclass(planner) else {}
+    options = {key: value for key, value in given.items() if known.get(key, key) != value}
+    return {"planner": label if usual is not None else f"FILE.py:{label}", "options": options}
+
+
+def _generating(world: dict[str, Any]) -> tuple[str, str]:
+    """Return the file's name of a random world, and the command that generates it first."""
+    from antdrive.sim.forms import option_text
+
+    kind, seed = world.pop("generate"), world.pop("seed", 0)
+    name = f"{kind}-{seed}.yaml"
+    words = ["antdrive", "worlds", "generate", kind, "--seed", str(seed), "--out", name]
+    words += [word for key, value in world.items() for word in ("--set", f"{key}={option_text(value)}")]
+    return name, f"{shlex.join(words)} && "
+
+
+def written_of(record: DriveRecord) -> Written:
+    """Return the scenario of a log as written; settings of logs without it are those that were in force."""
+    if record.written is not None:
+        return record.written
+    words = _named_task(record.task, "") | _named_planner(record.planner.settings, record.planner.name)
+    return Written(**words, **_named_robot(record.robot, ""), settings=_settings_in_force(record), seed=record.seed)
+
+
+def command_of(record: DriveRecord) -> str | None:
+    """Return the `antdrive run` command of a log's scenario; None if a setting has no option."""
+    try:
+        return written_of(record).command()
+    except (FieldError, InputError):
+        return None
+
+
+def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenario:
+    """Return the scenario of a log's record. With the same versions it gives the same drive, bit for bit.
+
+    Args:
+        record: the record of a log
+        planner: the planner; FILE.py:CLASS or MODULE:CLASS: custom code with the record's settings; None: the planner of
+            the record's name, with the record's settings
+
+    Raises:
+        InputError: the planner or controller cannot be found by its name, or has custom settings.
+    """
+    name = record.planner.name
+    made: dict[str, Any] = {"task": record.task, "robot": record.robot, "planner_name": name}
+    if isinstance(planner, str):
+        if record_name(planner) not in (planner, name):
+            raise InputError(f"planner: the log's planner is {name!r:.60}, not {record_name(planner)!r:.60}")
+        if not is_user_code(planner):
+            raise InputError(
+                f"planner: write FILE.py:CLASS or MODULE:CLASS, got {planner!r:.60}; omit it for registered planners"
+            )
+        word = planner
+    elif planner is None:
+        word = made["planner_name"] = _registered(name)
+    else:
+        word, made["planner"] = "", planner
+    try:
+        settings = _settings_in_force(record)
+    except FieldError as error:
+        raise InputError(str(error.under("record"))) from None
+    words = Written(
+        world="", planner=word, options=record.planner.settings, settings=settings, seed=record.seed,
+    )  # fmt: skip
+
+    def at(key: str, problem: str) -> InputError:
+        return _as_keys(key if key.startswith("planner") else f"record.{key}", problem)
+
+    return words.scenario(at=at, **made)
+
+
+def _registered(name: str) -> str:
+    """Return the registered name of a record's planner, which may be that of its class."""
+    from antdrive.planners import list_planners
+
+    known = list_planners()
+    named = [key for key, planner in known.items() if name in (key, type(planner).__name__)]
+    if not named:
+        raise InputError(
+            f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; name its class "
+            f"(--planner FILE.py:CLASS), or register it under the entry point antdrive.planners"
+        )
+    return name if name in named else named[0]
+
+
+def _settings_in_force(record: DriveRecord) -> dict[str, Any]:
+    """Return the settings of a log's record that differ from the defaults, by key.
+
+    Raises:
+        FieldError: a setting is unknown or invalid.
+    """
+    from antdrive.sim.forms import scenario_fields, written
+
+    if record.controller.name != "PurePursuit":
+        raise FieldError("controller.name", f"{record.controller.name!r:.60} cannot be rebuilt; only PurePursuit can")
+    plain = ("noise", "margin", "time_limit", "physics_hz", "control_hz", "unseen")
+    given: dict[str, Any] = {name: getattr(record, name) for name in plain}
+    given |= {SETTINGS[name].key: value for name, value in (record.settings or {}).items()}
+    given |= {"smoothing": record.smoothing.asked, "cell": record.asked_cell or record.cell}
+    given["controller"] = dict(record.controller.settings)
+    if record.sensing is not None:
+        given |= dataclasses.asdict(record.sensing)
+    switched = {"avoid": record.avoidance} if record.perception is not None else {}
+    if record.perception is not None:
+        reach = record.perception.range_m
+        given["sees"] = record.perception.kind + ("" if reach is None else f":{reach!r}")
+    if record.perception is not None or record.sensing is not None:
+        switched["replan"] = record.replanning
+    given |= {key: "none" if value is None else dict(value) for key, value in switched.items()}
+    fields = scenario_fields(given)
+    return {key: value for key, value in written(fields.__getitem__).items() if key != "seed"}

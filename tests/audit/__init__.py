@@ -1,0 +1,1 @@
+"""Audits of what drives, logs and suites claim: `python -m tests.audit.NAME`."""

@@ -1,0 +1,165 @@
+"""Scenarios in words: written to commands, files and records, and read again as the same."""
+
+import dataclasses
+import json
+import shlex
+
+import pytest
+import typer
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from antdrive.base import InputError
+from antdrive.cli import options
+from antdrive.cli.scenario_options import Ends, Setup
+from antdrive.planners import AStar, load_planner
+from antdrive.sim import Scenario
+from antdrive.sim.log.record import settings_of
+from antdrive.sim.settings import LOCALISATIONS, SETTINGS, SMOOTHINGS
+from antdrive.sim.written import Written
+from antdrive.worlds import load_task
+
+METRES = st.floats(0.001, 1.0).map(lambda value: round(value, 6))
+OF = {
+    "smoothing": st.sampled_from(SMOOTHINGS),
+    "noise": st.floats(0, 2).map(lambda value: round(value, 6)),
+    "margin": METRES | st.just("auto"),
+    "cell": METRES,
+    "footprint": st.sampled_from(["auto", "disc"]),
+    "map": st.just("given"),
+    "localisation": st.sampled_from(sorted({*LOCALISATIONS} - {"matching"})),
+    "odometry": METRES,
+    "controller": st.fixed_dictionaries({"lookahead_time": METRES}),
+    "sees": st.sampled_from(["positions", "velocities:2.5", "motions"]),
+    "avoid": st.just(False) | st.just("none"),
+    "replan": st.just(False),
+    "unseen": st.lists(
+        st.fixed_dictionaries({"x": st.just(3.0), "y": METRES, "radius": METRES}), min_size=1, max_size=2
+    ),
+    "time_limit": METRES,
+}
+GIVEN = st.fixed_dictionaries({}, optional=OF)
+OPTIONS = st.fixed_dictionaries({}, optional={"ants": st.integers(1, 99), "evaporation": METRES})
+WORDS = st.builds(
+    Written,
+    world=st.sampled_from(["forest", "empty"]),
+    start=st.none() | st.just([1.5, 1.5, 0.25]),
+    goal=st.none() | st.just([4.0, 3.0]),
+    planner=st.just("aco-han"),
+    options=OPTIONS,
+    robot=st.sampled_from(["turtlebot", "jackal"]),
+    settings=GIVEN,
+    seed=st.integers(0, 2**63 - 1),
+)
+PLAIN = Written(world="forest", planner="aco-han")
+
+
+@given(WORDS)
+def test_plain_data_is_read_as_the_same_words(words):
+    assert Written.read(json.loads(json.dumps(words.plain()))) == words
+
+
+@given(WORDS)
+@settings(max_examples=25)
+def test_a_scenario_keeps_the_words_that_it_was_made_of(words):
+    s = words.scenario()
+    again = Written.of(s).scenario()
+    assert again == s
+    assert again.key == s.key
+
+
+def scenario_of_arguments(arguments):
+    """Return the scenario that `antdrive run` would drive for its arguments."""
+    read = []
+
+    @options.with_settings(name for name, one in SETTINGS.items() if one.flag)
+    def reading(*, world: options.World, setup: Setup, ends: Ends, **given):
+        read.append(setup.scenario(ends.of(world), given))
+
+    app = typer.Typer()
+    app.command()(reading)
+    typer.main.get_command(app).main(arguments, standalone_mode=False)
+    return read[-1]
+
+
+@given(WORDS)
+@settings(max_examples=15)
+def test_a_command_is_parsed_to_the_same_scenario(words):
+    words = Written(**{**vars(words), "settings": {**words.settings, "margin": 0.1}})
+    command = words.command()
+    if command is None:
+        assert words.settings.get("avoid") == "none"
+    else:
+        assert scenario_of_arguments(shlex.split(command)[2:]) == words.scenario()
+
+
+@given(st.sampled_from(sorted(OF)), st.data())
+def test_the_key_differs_with_every_setting(name, data):
+    usual, s = PLAIN.scenario(), Written(**{**vars(PLAIN), "settings": {name: data.draw(OF[name])}}).scenario()
+    assert (s.key == usual.key) == (s == usual)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"seed": 1},
+        {"world": "empty"},
+        {"robot": "jackal"},
+        {"planner": "as"},
+        {"options": {"ants": 3}},
+        {"goal": [4, 4]},
+    ],
+)
+def test_the_key_differs_with_every_other_word(other):
+    assert Written(**{**vars(PLAIN), **other}).scenario().key != PLAIN.scenario().key
+
+
+def test_the_key_of_a_scenario_is_that_of_its_run_in_a_campaign():
+    from antdrive.runs.campaigns.campaign import make_campaign
+    from antdrive.runs.campaigns.expanding import expand
+
+    data = {"worlds": "forest", "planners": {"name": "aco-han", "ants": 3}, "noise": 1.0, "seeds": [4]}
+    (job,) = expand(make_campaign(data)).jobs
+    assert job.key == Scenario.of("forest", "aco-han", options={"ants": 3}, noise=1.0, seed=4).key
+    assert job.key == "1a28ffe7640dffa2916b157f85401910", "as in folders written before"
+
+
+def test_parts_made_in_python_are_files_named_after_them():
+    task = load_task("forest")
+    s = Scenario(task=task, planner=AStar(), robot=Scenario.of("forest").robot)
+    assert Written.of(s) == Written(
+        world="forest", planner="FILE.py:AStar", robot="turtlebot", options=settings_of(AStar())
+    )
+    named = Scenario.of(task, load_planner("aco-han", ants=7), seed=2)
+    assert Written.of(named).seed == 2
+
+
+def test_words_of_a_part_that_was_replaced_do_not_count():
+    s = Scenario.of("forest", "astar")
+    moved = dataclasses.replace(s, task=dataclasses.replace(s.task, goal=(4.0, 3.0)))
+    assert Written.of(moved).goal == [4.0, 3.0]
+    assert Written.of(dataclasses.replace(s, noise=1.0)) == dataclasses.replace(Written.of(s), settings={"noise": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("words", "key"),
+    [
+        ({"world": "emty"}, "world"),
+        ({"robot": "jakal"}, "robot"),
+        ({"planner": "astarr"}, "planner"),
+        ({"planner": {"name": "as", "antss": 3}}, "planner.antss"),
+        ({"goal": [-1, 0]}, "goal"),
+        ({"noise": -1.0}, "noise"),
+        ({"world": {"generate": "forest", "seed": -1}}, "world.seed"),
+        ({"nois": 1}, "nois"),
+        ({"start": [1, 2]}, "start"),
+        ({"seed": "one"}, "seed"),
+    ],
+)
+def test_an_error_has_the_place_of_its_key(words, key):
+    def at(key, problem):
+        return InputError(f"here.{key}")
+
+    with pytest.raises((InputError, ValueError)) as said:
+        Written.read({"world": "forest", "planner": "astar", **words}).scenario(at=at)
+    assert getattr(said.value, "key", "") == key or str(said.value) == f"here.{key}"
