@@ -153,10 +153,8 @@ def with_chosen_margin(scenario: "Scenario") -> "Scenario":
 
 def random_world(unknown: str, kind: str, seed: int, values: Mapping[str, str], name: str) -> "Task":
     """Generate a random world. `unknown` starts the error message about an unknown kind."""
-    import numpy as np
-
     from antdrive.worlds import GENERATORS, generate
 
     if kind not in GENERATORS:
         raise InputError(f"{unknown}; choose from {', '.join(GENERATORS)}")
-    return generate(kind, np.random.default_rng(seed), values, name=name, note=f"seed {seed}")
+    return generate(kind, seed, values, name=name, note=f"seed {seed}")

@@ -35,7 +35,7 @@ from antdrive.sim.driving.rules import (
 )
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverDetector, MoverTracking, SimulatedLidar, Survey
-from antdrive.sim.policy import OBSTRUCTED, Perception, ReplanPolicy
+from antdrive.sim.policy import OBSTRUCTED, Perception
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
 from antdrive.worlds import Cruising, Disc, Task, World
@@ -56,9 +56,6 @@ class Parts(NamedTuple):
     guide: RouteGuide
     rules: tuple[Rule, ...]  # in order of application
     logs: tuple[Logs, ...]
-    perception: Perception | None  # perception of movers
-    avoidance: Avoidance | None  # avoidance of movers
-    replanning: ReplanPolicy | None  # when to replan
     limiters: tuple[str, ...]  # names of the rules that limit the speed
     mapped: bool  # whether plans use the given map
 
@@ -110,9 +107,6 @@ def compose(s: Scenario) -> Parts:
         guide,
         tuple(rules),
         tuple(part for part in (localiser, guide, scans, tracking) if part is not None),
-        perception=perception if moving else None,
-        avoidance=avoidance if moving else None,
-        replanning=s.replanning if moving or survey else None,
         limiters=EXPLORING_LIMITERS if survey else LIMITERS,
         mapped=mapped,
     )

@@ -224,7 +224,7 @@ ODD_NAME = "a|b|c `x` <script>alert(1)</script> ``` </details> [u](v) *s*"
 
 def test_markdown_shows_odd_names_as_they_are(small_run, tmp_path):
     task = small_run.scenario.task
-    record = replace(small_run.rollout.record, task=changed(task, "world", name=ODD_NAME))
+    record = replace(small_run.rollout.record, task=changed(task, "world", name=ODD_NAME), written=None)
     odd = changed(small_run, "rollout", record=record)
     write_run(
         odd, tmp_path / "runs" / "a", command="rm -rf ~ # antdrive run ```x\n```\n<b>", reason="\x1b[31mred\u202e"
