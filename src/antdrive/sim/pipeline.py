@@ -11,7 +11,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.progress import progress_bar
 from antdrive.base.version import require_physics
 from antdrive.planners import PlanResult, PlanStatus
-from antdrive.sim.compose import compose, warm_up_replanning
+from antdrive.sim.compose import compose
 from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.facts import LoggedRun, result_of
@@ -175,7 +175,6 @@ def driven(
         return grid, answer, None
     route, path = parts.guide.route(grid, answer)
     limit = s.time_limit or s.task.time_limit or usual_time_limit(route.length, s.robot, s.noise)
-    warm_up_replanning(s)
     started = time.perf_counter()
     driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz)
     with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories) as engine:
