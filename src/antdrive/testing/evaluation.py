@@ -130,7 +130,7 @@ class Check:
             address=self.address,
             passed=evaluation.passed,
             outcome=run.outcome.key,
-            certified=run.certificate is not None and run.certificate.certified,
+            certified=run.certified,
             case="" if path is None else self.name,
             faults=evaluation.faults,
             gains=evaluation.gains,
@@ -267,10 +267,8 @@ def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> 
     except FieldError as error:
         outcome, fault, raised = INVALID_INPUT, str(case.error(error.key, error.problem)), error
     except InputError as error:
-        placed = (
-            case.error(error.key, error.problem) if error.key else error
-        )  # found in the run, such as a cell too small
-        outcome, fault, raised = INVALID_INPUT, str(placed), error
+        fault = str(case.error(error.key, error.problem) if error.key else error)  # such as a cell that is too small
+        outcome, raised = INVALID_INPUT, error
     except Exception as error:  # user planners may raise anything
         outcome, fault, raised = INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}", error
     return _check_of(case, update, results).failed_early(outcome, fault, raised)
