@@ -24,7 +24,7 @@ from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from antdrive.base.document import MAX_DEPTH
 from antdrive.base.errors import FieldError
-from antdrive.base.files import parse_json
+from antdrive.base.files import json_value, parse_json
 from antdrive.base.records import STRICT, attributes_of
 from antdrive.base.types import Point
 from antdrive.robots.spec import Odometry, RobotSpec
@@ -522,15 +522,7 @@ def plain_value(value: Any) -> Any:
 
 def settings_of(values: Any) -> dict[str, Any]:
     """Convert settings to plain values, with null for an infinite number, which means "no limit"."""
-
-    def finite(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {key: finite(inner) for key, inner in value.items()}
-        if isinstance(value, list):
-            return [finite(inner) for inner in value]
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    plain = finite(plain_value(values))
+    plain = json_value(plain_value(values))
     assert isinstance(plain, dict)
     return plain
 
