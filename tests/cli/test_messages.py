@@ -73,6 +73,7 @@ plan office.yaml --goal 9,9
 plan tight.yaml -p astar
 render nothing.npz -o f.mp4
 render run.npz -o x.avi
+render run.npz -o x.png --at 99
 render run.npz -o x.mp4 --camera moon
 render run.npz -o x.mp4 --size big
 render run.npz run.npz -o x.png

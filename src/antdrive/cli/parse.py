@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from antdrive.base.errors import InputError
+from antdrive.cli.console import print_error
 
 if TYPE_CHECKING:
     from antdrive.worlds import Disc
@@ -23,6 +25,20 @@ def numbers(option: str, text: str | None, count: int, form: str = "") -> tuple[
         expected = form or f"{count} comma-separated numbers"
         raise InputError(f"{option} {text}: must be {expected}, each number within ±1e6")
     return values
+
+
+def pose(option: str, text: str | None) -> tuple[float, ...] | None:
+    """Parse X,Y,YAW, the yaw in radians or like 90deg; None stays None. A yaw beyond a full turn is noted on stderr."""
+    place, _, yaw = (text or "").rpartition(",")
+    degrees = yaw.strip().removesuffix("deg")
+    if degrees == yaw.strip():
+        values = numbers(option, text, 3, "X,Y,YAW")
+        if values is not None and abs(values[2]) > 2 * math.pi:
+            turned = f"a yaw of {yaw.strip()} rad is {math.degrees(values[2]) % 360:.0f} degrees"
+            print_error(f"{option} {text}: {turned}; write {place},{yaw.strip()}deg for degrees")
+        return values
+    values = numbers(option, f"{place},{degrees}", 3, "X,Y,YAW")
+    return None if values is None else (*values[:2], math.radians(values[2]))
 
 
 def pair(text: str, option: str = "--set") -> tuple[str, str]:

@@ -11,7 +11,7 @@ from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.version import require_physics
 from antdrive.cli.console import bar, print_error
 from antdrive.cli.options import Planner, Robot, option
-from antdrive.cli.parse import numbers, pair
+from antdrive.cli.parse import numbers, pair, pose
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -35,7 +35,7 @@ class Ends:
         str | None,
         option(
             "X,Y,YAW",
-            "Start pose [m, m, rad].  [default: the task's]",
+            "Start pose [m, m, rad or 90deg].  [default: the task's]",
             panel="World",
         ),
     ] = None
@@ -58,7 +58,7 @@ class Ends:
 
         if self.frame not in FRAMES:
             raise InputError(f"--frame {self.frame}: unknown; choose from {', '.join(FRAMES)}")
-        given = {"start": numbers("--start", self.start, 3, "X,Y,YAW"), "goal": numbers("--goal", self.goal, 2, "X,Y")}
+        given = {"start": pose("--start", self.start), "goal": numbers("--goal", self.goal, 2, "X,Y")}
         ends = {key: list(value) for key, value in given.items() if value is not None}
         if ends and self.frame == MAP_FRAME:
             from antdrive.base.plane import map_to_world

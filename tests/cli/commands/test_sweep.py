@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.base.atomic import folder_lock
-from antdrive.cli.console import duration
+from antdrive.cli.console import campaign_bar, duration
 from antdrive.cli.groups import _without_again
 from antdrive.runs.campaigns import canonical_bytes, read_results
 
@@ -145,3 +145,12 @@ def test_without_parquet_the_extra_is_named(refused, campaign, monkeypatch):
 )
 def test_times_are_told_in_fitting_units(seconds, words):
     assert duration(seconds) == words
+
+
+def test_a_campaign_whose_output_goes_to_a_file_is_noted_each_minute(monkeypatch, capsys):
+    now = iter([0.0, 0.0, 30.0, 60.0, 90.0, 120.0])  # once before the campaign, then for each run
+    monkeypatch.setattr("antdrive.cli.console.time.monotonic", lambda: next(now))
+    with campaign_bar("driving") as update:
+        for done in range(5):
+            update(done, 4)
+    assert capsys.readouterr().err == "antdrive: driving: 2 of 4 runs, 0.0 runs/s, 60 s left\n"

@@ -10,7 +10,7 @@ from antdrive.cli import options
 from antdrive.cli.console import bar, file_lines, show, stage
 from antdrive.cli.listings import Row, world_lines
 from antdrive.cli.options import argument, flag, option
-from antdrive.cli.parse import import_target, numbers, pair
+from antdrive.cli.parse import import_target, numbers, pair, pose
 from antdrive.cli.scenario_options import Ends
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def import_world(
         Path | None, option("FILE", "World file to write (DynaBARN: folder).  [default: FILE's name]")
     ] = None,
     barn: Annotated[bool, flag("SDF: start and goal of the BARN Challenge.", "--barn")] = False,
-    start: Annotated[str | None, option("X,Y,YAW", "Start pose [m, m, rad]; maps contain none.")] = None,
+    start: Annotated[str | None, option("X,Y,YAW", "Start pose [m, m, rad or 90deg]; maps contain none.")] = None,
     goal: Annotated[str | None, option("X,Y", "Goal [m]; maps contain none.")] = None,
     bounds: Annotated[
         str | None, option("BOUNDS", "SDF: walls at XMIN,YMIN,XMAX,YMAX [m].  [default: 1 m around the obstacles]")
@@ -151,7 +151,7 @@ def import_world(
     with bar("converting") as progress, conversion_progress(progress):
         tasks = import_file(
             path,
-            start=numbers("--start", start, 3, "X,Y,YAW"),
+            start=pose("--start", start),
             goal=numbers("--goal", goal, 2, "X,Y"),
             bounds=numbers("--bounds", bounds, 4),
             barn=barn,

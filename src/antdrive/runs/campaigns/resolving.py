@@ -110,7 +110,7 @@ def _random(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Itera
         raise campaign.error((*place, key), str(error)) from None
     suffix = "".join(f" {name}={option_text(value)}" for name, value in entry.items() if name != "generate")
     for seed in seeds:
-        with placed(lambda _, problem: campaign.error(place, problem)):
+        with placed(campaign.at(*place, skip=1)):
             task = Written(world={**entry, "seed": seed}).load_task()
         yield NamedTask(f"{kind}-{seed}{suffix}", OWN, task, None, place), f"{kind}-{seed}{suffix} ({place[1]})"
 
@@ -190,9 +190,7 @@ def _variants(campaign: Campaign, place: Location, options: dict[str, Any]) -> I
     source = given_name if path is None else f"{path}:{inner}"
     name = given_name if path is None else f"{path.name}:{inner}"
 
-    def at(key: str, problem: str) -> InputError:
-        return campaign.error((*place, *key.split(".")[1:]), problem)
-
+    at = campaign.at(*place, skip=1)
     with placed(at):
         version = planner_version(source)
     word = name if path is None else f"{PLANNER_FILES}/{version.rpartition(' ')[2]}/{name}"
