@@ -69,18 +69,6 @@ def size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def log_at(path: Path) -> Path:
-    """Return the log at a path: the file itself, or the log in a run's folder."""
-    if not path.is_dir():
-        return path
-    log = path / "rollout.npz"
-    if log.exists():
-        return log
-    ran = (path / "result.json").exists()
-    hint = "its run ended before the robot drove" if ran else "name a folder written by antdrive run"
-    raise InputError(f"{path}: contains no rollout.npz; {hint}")
-
-
 def import_target(source: Path, out: Path | None, usual: Path, what: str) -> Path:
     """Return the file that an import writes: never its source, and an existing file only if named."""
     target = out or usual

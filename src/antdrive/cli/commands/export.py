@@ -9,7 +9,7 @@ from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import flag, option
-from antdrive.cli.parse import log_at, pair
+from antdrive.cli.parse import pair
 
 
 def export(
@@ -34,6 +34,7 @@ def export(
     """
     from antdrive.robots import RobotSpec
     from antdrive.robots.importing.model import checked_packages
+    from antdrive.sim.log.rollout import log_at
     from antdrive.views.export.exporting import EXPORTS
     from antdrive.views.export.exporting import export as write
     from antdrive.views.export.robot_frames import RobotFrames, frames_of_spec, frames_of_urdf
