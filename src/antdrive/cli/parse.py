@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli.console import print_error
@@ -59,6 +59,14 @@ def disc(text: str) -> Disc:
         return Disc(*values)
     except ValueError as error:
         raise InputError(f"--unseen {text}: {error}") from None
+
+
+def xacro(arguments: list[str] | None, packages: list[str] | None) -> dict[str, Any]:
+    """Parse the NAME=VALUE of `--arg` and the NAME=FOLDER of `--package` for readers of robot descriptions."""
+    from antdrive.robots.importing.model import checked_packages
+
+    folders = checked_packages(dict(pair(word, "--package") for word in packages or ()))
+    return {"arguments": dict(pair(word, "--arg") for word in arguments or ()), "packages": folders}
 
 
 def size(text: str) -> tuple[int, int]:

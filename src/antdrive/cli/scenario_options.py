@@ -149,12 +149,3 @@ def with_chosen_margin(scenario: "Scenario") -> "Scenario":
         print_error(f"{label}: about {TYPICAL_MARGINS * DRIVES} short drives, result cached")
     with bar(label) as progress:
         return choose(scenario, lambda done, margin: progress(min(0.99, done / (TYPICAL_MARGINS * DRIVES))))
-
-
-def random_world(unknown: str, kind: str, seed: int, values: Mapping[str, str], name: str) -> "Task":
-    """Generate a random world. `unknown` starts the error message about an unknown kind."""
-    from antdrive.worlds import GENERATORS, generate
-
-    if kind not in GENERATORS:
-        raise InputError(f"{unknown}; choose from {', '.join(GENERATORS)}")
-    return generate(kind, seed, values, name=name, note=f"seed {seed}")

@@ -7,7 +7,7 @@ from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.console import planning, show
 from antdrive.cli.options import argument, option
-from antdrive.cli.scenario_options import Ends, Setup, random_world
+from antdrive.cli.scenario_options import Ends, Setup
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
@@ -39,18 +39,15 @@ def find_margin(
     from antdrive.runs.margins.choice import MarginSearch
     from antdrive.runs.margins.choice import find_margin as search
     from antdrive.sim.pipeline import run as drive
+    from antdrive.worlds.generators.generate import generated
 
     first = given.pop("seed")
     base = setup.scenario(_chosen(world, kind, ends), given)
     if max_speed is not None:
         slowed = dataclasses.replace(base.robot, max_speed=min(max_speed, base.robot.max_speed))
         base = dataclasses.replace(base, robot=slowed)
-    tasks = {
-        seed: base.task
-        if kind is None
-        else random_world(f"--generate {kind}: unknown kind", kind, seed, {}, f"{kind}-{seed}")
-        for seed in range(first, first + seeds)
-    }
+    numbers = range(first, first + seeds)
+    tasks = {seed: base.task if kind is None else generated(kind, seed, ()) for seed in numbers}
 
     def drive_with(margin: float, seed: int) -> "Run":
         return drive(dataclasses.replace(base, task=tasks[seed], margin=margin, seed=seed))

@@ -11,7 +11,7 @@ from antdrive.cli.console import bar, file_lines, show, stage
 from antdrive.cli.listings import Row, world_lines
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import import_target, numbers, pair, pose
-from antdrive.cli.scenario_options import Ends, random_world
+from antdrive.cli.scenario_options import Ends
 
 if TYPE_CHECKING:
     pass
@@ -82,10 +82,10 @@ def generate_world(
     **given: Any,
 ) -> None:
     """Generate a random world."""
-    from antdrive.worlds import save_task
+    from antdrive.worlds import generate, save_task
 
     values = dict(pair(text) for text in settings or ())
-    save_task(random_world(f"generate: unknown kind {kind!r}", kind, given["seed"], values, out.stem), out)
+    save_task(generate(kind, given["seed"], values, name=out.stem, note=f"seed {given['seed']}"), out)
     show(False, None, file_lines({"world": out}))
 
 
