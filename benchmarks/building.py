@@ -24,7 +24,7 @@ from typing import Any, TypeVar
 import numpy as np
 from PIL import Image
 
-from antdrive.planners import Query, checked, load_planner, smooth
+from antdrive.planners import Query, load_planner, smooth, validated
 from antdrive.robots import PurePursuit, load_robot
 from antdrive.sim import Engine, Rollout, Scenario, certify, run
 from antdrive.sim.driving.drive import follow
@@ -134,7 +134,7 @@ def stages(folder: Path) -> None:
     query = Query.between(grid, task)
     answer = stage("plan with astar", lambda: load_planner("astar").plan(query, np.random.default_rng(0)))
     print(f"  {answer.line_length:.1f} m over {len(answer.cells)} cells")
-    stage("check the plan", lambda: checked(query, answer))
+    stage("check the plan", lambda: validated(query, answer))
     route = stage("route with clearance", lambda: smooth(answer, grid, task, kind="clearance"))
     print(f"  {route.length:.1f} m")
     stage("controller's index", lambda: PurePursuit().prepare(route, task.world, robot, 0.03, 1 / 60))

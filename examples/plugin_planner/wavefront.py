@@ -15,7 +15,7 @@ class Wavefront(GridPlanner):
 
     straight: bool = False  # no diagonal moves
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
         before, queue = {query.start: query.start}, deque([query.start])
         while queue and query.goal not in before:
             row, col = here = queue.popleft()

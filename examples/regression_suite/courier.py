@@ -19,7 +19,7 @@ class WideBerth(GridPlanner):
     price: float = 1.5  # relative extra cost of cells next to an obstacle
     reach: int = 3  # distance from obstacles at which the penalty ends [cells]
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
         prices, moves = 1.0 + self.price * self._closeness(query.grid.free), query.grid.moves
         best, before = {query.start: 0.0}, {}
         queue, done = [(0.0, query.start)], set()

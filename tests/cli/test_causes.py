@@ -35,7 +35,7 @@ from beside import BITS
 
 @dataclass(frozen=True, kw_only=True)
 class Mine(GridPlanner):
-    def _plan(self, query, rng):
+    def search(self, query, rng):
         bits = BITS
         (r, c), (_, c1) = query.start, query.goal
         rows = [r, *(r + (bits >> k & 1) for k in range(c1 - c - 1)), r]

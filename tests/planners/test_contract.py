@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from antdrive.base import InputError
-from antdrive.planners import PLANNERS, PlanStatus, Query, capabilities_of, check_plan, path_cost
+from antdrive.planners import PLANNERS, PlanStatus, Query, capabilities_of, path_cost, validate_plan
 from antdrive.worlds import DIRECTIONS, Grid, polyline_clearance
 from tests.planners.worlds_to_solve import catalogue, optimum, quick, random_query, sealed
 
@@ -18,9 +18,9 @@ INCOMPLETE = [name for name, planner in PLANNERS.items() if not capabilities_of(
 
 
 def solve(name, query, seed=0):
-    """Return a planner's answer after `check_plan` accepts it."""
+    """Return a planner's answer after `validate_plan` accepts it."""
     result = quick(name, ants=60, iterations=12).plan(query, np.random.default_rng(seed))
-    assert check_plan(query, result) == ""
+    assert validate_plan(query, result) == ""
     return result
 
 

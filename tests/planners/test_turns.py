@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.planners import PLANNERS, Query, capabilities_of, check_plan, load_planner, replanner_for
+from antdrive.planners import PLANNERS, Query, capabilities_of, load_planner, replanner_for, validate_plan
 from antdrive.planners.iterative import IterativePlanner
 from antdrive.worlds import DIRECTIONS, rasterise
 from tests.worlds.test_turns import LONG, world_of
@@ -66,7 +66,7 @@ def shortest(grid, blocked, start, heading, goal):
 
 def fits(name, query, plan, length):
     """Assert that a plan is valid, and of the given length as far as the planner promises; return whether it is solved."""
-    assert check_plan(query, plan) == ""
+    assert validate_plan(query, plan) == ""
     assert plan.cost >= length - 1e-9
     if name in OPTIMAL:
         assert plan.cost == pytest.approx(length)
@@ -162,7 +162,7 @@ def test_a_path_is_followed_without_work_only_at_its_headings(name):
     labels = query.grid.turns.label[query.start[0] * query.grid.shape[1] + query.start[1]]
     other = next(k for k in range(8) if k not in query.start_headings and labels[k] >= 0)
     replanner.move(query.start, other)
-    assert check_plan(replanner.query, replanner.result()) == ""
+    assert validate_plan(replanner.query, replanner.result()) == ""
     assert replanner.query.start_node != query.start_node
 
 

@@ -27,12 +27,12 @@ from antdrive.planners import (
     agent_for,
     as_iterative,
     capabilities_of,
-    check_plan,
-    checked,
     load_planner,
     path_cost,
     replanner_for,
     request_plan,
+    validate_plan,
+    validated,
 )
 from antdrive.worlds import Cruising, Disc, Grid, Task, Trajectories, World, rasterise
 from tests.planners.worlds_to_solve import catalogue
@@ -66,11 +66,11 @@ def with_cells(cells):
 
 def test_a_valid_plan_is_unchanged_and_a_copy():
     for plan in (RIGHT, LINE):
-        kept = checked(QUERY, plan)
+        kept = validated(QUERY, plan)
         assert kept.cells is not plan.cells
         assert np.array_equal(kept.cells, plan.cells)
         assert np.array_equal(kept.line, plan.line)
-    assert check_plan(*timed()) == ""
+    assert validate_plan(*timed()) == ""
 
 
 class Unlocking(AStar):
@@ -116,9 +116,9 @@ def test_a_plan_that_was_changed_in_one_place_is_refused(data):
         mutant = with_cells(cells[::-1])
     else:
         mutant = with_cells(cells[:k])
-    assert check_plan(QUERY, mutant)
-    assert checked(QUERY, mutant).status is PlanStatus.INVALID
-    assert not len(checked(QUERY, mutant).cells)
+    assert validate_plan(QUERY, mutant)
+    assert validated(QUERY, mutant).status is PlanStatus.INVALID
+    assert not len(validated(QUERY, mutant).cells)
 
 
 def test_the_first_invalid_step_is_named():
@@ -127,7 +127,7 @@ def test_the_first_invalid_step_is_named():
     cells[7] += 5
     (r, c), (rr, cc) = cells[2], cells[3]
     assert (
-        check_plan(QUERY, with_cells(cells))
+        validate_plan(QUERY, with_cells(cells))
         == f"cells: step 2 from ({r}, {c}) to ({rr}, {cc}) does not lead to a neighbour"
     )
 
@@ -136,16 +136,16 @@ def test_a_move_that_the_grid_forbids_is_refused():
     grid = Grid.from_free([[True, False], [True, True]])
     query = Query(grid, (0, 0), (1, 1))
     diagonal = PlanResult(status=PlanStatus.SOLVED, cells=np.array([[0, 0], [1, 1]]), cost=math.sqrt(2))
-    assert check_plan(query, diagonal) == "cells: step 0 from (0, 0) to (1, 1) is no allowed move"
+    assert validate_plan(query, diagonal) == "cells: step 0 from (0, 0) to (1, 1) is no allowed move"
     around = PlanResult(status=PlanStatus.SOLVED, cells=np.array([[0, 0], [1, 0], [1, 1]]), cost=2.0)
-    assert check_plan(query, around) == ""
-    assert checked(query, around).cells.dtype == np.int32
+    assert validate_plan(query, around) == ""
+    assert validated(query, around).cells.dtype == np.int32
 
 
 def test_a_negative_cell_is_outside_and_not_the_last_one():
     query = Query(Grid.from_free(np.ones((3, 3))), (0, 0), (0, 2))
     back = PlanResult(status=PlanStatus.SOLVED, cells=np.array([[0, 0], [0, -1], [0, 2]]), cost=2.0)
-    assert "number 1, (0, -1), is outside" in check_plan(query, back)
+    assert "number 1, (0, -1), is outside" in validate_plan(query, back)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +177,7 @@ def test_a_negative_cell_is_outside_and_not_the_last_one():
     ids=lambda value: str(value)[:24],
 )
 def test_a_field_of_an_invalid_type_is_named(change, says):
-    assert check_plan(QUERY, dataclasses.replace(RIGHT, **change)).startswith(says)
+    assert validate_plan(QUERY, dataclasses.replace(RIGHT, **change)).startswith(says)
 
 
 @pytest.mark.parametrize(
@@ -194,12 +194,12 @@ def test_a_field_of_an_invalid_type_is_named(change, says):
 )
 def test_an_invalid_line_is_refused(change, says):
     mutant = dataclasses.replace(LINE, waypoints=change(LINE.waypoints))
-    assert re.match(f"waypoints: .*{says}", check_plan(QUERY, mutant))
+    assert re.match(f"waypoints: .*{says}", validate_plan(QUERY, mutant))
 
 
 @pytest.mark.parametrize("factor", [0.9, 1.001, math.nan, math.inf])
 def test_a_line_of_another_length_is_refused(factor):
-    assert check_plan(QUERY, dataclasses.replace(LINE, length=LINE.length * factor)).startswith("length: ")
+    assert validate_plan(QUERY, dataclasses.replace(LINE, length=LINE.length * factor)).startswith("length: ")
 
 
 @pytest.mark.parametrize(
@@ -217,19 +217,19 @@ def test_a_line_of_another_length_is_refused(factor):
 )
 def test_times_that_do_not_increase_are_refused(change):
     query, plan = timed()
-    assert check_plan(query, dataclasses.replace(plan, **change(plan)))
+    assert validate_plan(query, dataclasses.replace(plan, **change(plan)))
 
 
 def test_among_motions_a_plan_without_times_is_refused():
     query, plan = timed()
     assert isinstance(plan, TimedPlan)
     bare = PlanResult(status=PlanStatus.SOLVED, cells=plan.cells, cost=plan.cost)
-    assert "needs a TimedPlan" in check_plan(query, bare)
+    assert "needs a TimedPlan" in validate_plan(query, bare)
 
 
 def test_a_path_from_an_end_that_cannot_be_used_is_refused():
     query = dataclasses.replace(QUERY, unreachable="no free cell near the start can be reached from it")
-    assert "no free cell near the start" in check_plan(query, RIGHT)
+    assert "no free cell near the start" in validate_plan(query, RIGHT)
 
 
 class Broken:
@@ -346,14 +346,14 @@ def test_an_answer_that_only_looks_like_a_plan_is_a_planner_error():
     "key", ["status", "cells", "waypoints", "cost", "work", "reason", "options", "history", "field"]
 )
 def test_a_field_without_a_text_is_named_by_its_type(key):
-    problem = checked(QUERY, dataclasses.replace(RIGHT, **{key: Hidden()})).reason
+    problem = validated(QUERY, dataclasses.replace(RIGHT, **{key: Hidden()})).reason
     assert problem.startswith(f"{key}: must be")
     assert problem.endswith("got a Hidden")
 
 
 def test_the_reason_of_a_plan_is_one_line():
     no_path = PlanResult(status=PlanStatus.NO_PATH, reason="a\nb\x1b[31m" + "x" * 999)
-    reason = checked(QUERY, no_path).reason
+    reason = validated(QUERY, no_path).reason
     assert reason.startswith("a\\nb\\x1b[31mxxx")
     assert len(reason) < 250
 
@@ -387,7 +387,7 @@ def test_a_replanner_or_agent_of_the_wrong_kind_is_named_with_what_it_lacks(meth
 
 def test_a_grid_planner_whose_search_returns_nothing_is_named():
     class Empty(GridPlanner):
-        def _plan(self, query, rng):
+        def search(self, query, rng):
             return None
 
     with pytest.raises(

@@ -48,17 +48,6 @@ def test_distance_to_the_walls_is_that_of_the_outline(foot, x, y, yaw):
     assert footprint_clearance(world, foot, [(x, y, yaw)])[0] == pytest.approx(brute, abs=1e-4)
 
 
-def test_many_poses_at_once_give_the_same_distances_as_one_by_one():
-    """The kernel reuses a list of nearby discs; it must never lack the nearest one."""
-    rng = np.random.default_rng(1)
-    world = World("w", (-10, -10, 10, 10), tuple(Disc(*rng.uniform(-9, 9, 2), 0.1) for _ in range(200)))
-    foot = Footprint.rectangle(0.5, 0.4)
-    walk = np.cumsum(rng.normal(0, 0.05, (2000, 3)), axis=0)
-    together = footprint_clearance(world, foot, walk)
-    alone = [footprint_clearance(world, foot, pose[None])[0] for pose in walk]
-    np.testing.assert_array_equal(together, alone)
-
-
 def test_the_radius_is_that_of_the_circumscribed_circle():
     assert Footprint.rectangle(0.508, 0.430).radius == pytest.approx(0.3328, abs=1e-4)
     assert Footprint.disc(0.18).radius == 0.18

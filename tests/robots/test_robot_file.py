@@ -67,6 +67,8 @@ def test_robots_without_corners_and_lidar_are_recorded_as_they_always_were():
     jackal, turtlebot = (dataclasses.replace(load_robot(name), lidar=None) for name in ("jackal", "turtlebot"))
     assert canonical_hash(jackal) == "8b9a050572644a9fa8fa254c229c73dd56e9a5dfaf8124b543ecbd96a284d8c2"
     assert canonical_hash(turtlebot) == "6015e6951db89082ddc290423b7db58efc1c599cf120244d54e904d6f4220f5f"
+    assert "lidar" not in robot_to_dict(turtlebot)
+    assert canonical_hash(load_robot("turtlebot")) != canonical_hash(turtlebot)
     assert robot_to_dict(load_robot("jackal"))["footprint"] == {
         "half_length": 0.254,
         "half_width": 0.215,

@@ -48,7 +48,7 @@ def test_one_route_of_different_plans_is_one_row_and_one_sentence(small_task):
 
 def test_an_error_of_a_planner_is_a_row_and_the_others_drive(small_task):
     class Broken(GridPlanner):
-        def _plan(self, query, rng):
+        def search(self, query, rng):
             raise RuntimeError("out of paint")
 
     made = antdrive.compare(small_task, {"broken": Broken(), "astar": "astar"}, seeds=[3, 4])

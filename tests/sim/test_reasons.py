@@ -187,7 +187,7 @@ def test_a_planner_that_decides_cell_by_cell_is_not_told_to_plan_for_the_footpri
 class GivesUp(GridPlanner):
     """Finds no path, ever."""
 
-    def _plan(self, query, rng):
+    def search(self, query, rng):
         return PlanResult(status=PlanStatus.NO_PATH, reason="too tired")
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from antdrive import Scenario, run
-from antdrive.planners import PLANNERS, Query, check_plan
+from antdrive.planners import PLANNERS, Query, validate_plan
 from antdrive.sim import Outcome, certify
 from antdrive.worlds import Disc, Task, World, rasterise
 from antdrive.worlds.route import end_reach
@@ -78,7 +78,7 @@ def with_line(task, *points, margin=0.03):
     answer = PLANNERS["astar"].plan(query, np.random.default_rng(0))
     line = np.array([task.start[:2], *points, task.goal])
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    return check_plan(query, replace(answer, waypoints=grid.fractional(line), length=length))
+    return validate_plan(query, replace(answer, waypoints=grid.fractional(line), length=length))
 
 
 def test_a_line_that_leads_elsewhere_than_its_cells_is_a_wrong_plan():

@@ -101,35 +101,12 @@ def test_a_cell_is_free_when_the_robot_fits_at_its_centre(world, cell, inflate):
         assert abs(clearance - inflate) < 1e-9 or grid.free[r, c] == (clearance > inflate)
 
 
-def test_a_thin_post_between_two_free_cells_closes_the_move():
-    world = World("post", (0.0, 0.0, 4.0, 2.0), (Disc(2.0, 0.5, 0.05),))
-    grid = rasterise(world, 1.0)
-    assert grid.free.all()
-    assert not bits(grid)[0, 1, DIRECTIONS.index((0, 1))]
-    assert bits(grid)[1, 1, DIRECTIONS.index((0, 1))]
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_every_move_can_be_taken_back(seed):
     moves = bits(rasterise(crowd(seed), 0.25, 0.2))
     for r, c, k in np.argwhere(moves):
         dr, dc = DIRECTIONS[k]
         assert moves[r + dr, c + dc, (k + 4) % 8]
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_larger_robot_has_no_move_that_a_smaller_one_lacks(seed):
-    small, large = (rasterise(crowd(seed), 0.25, r) for r in (0.1, 0.3))
-    assert not (large.moves & ~small.moves).any()
-    assert not (large.free & ~small.free).any()
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_removing_an_obstacle_closes_nothing(seed):
-    world = crowd(seed)
-    less = World(world.name, world.bounds, world.obstacles[1:])
-    before, after = (rasterise(w, 0.25, 0.2) for w in (world, less))
-    assert not (before.moves & ~after.moves).any()
 
 
 def test_the_order_of_obstacles_changes_nothing():
@@ -143,32 +120,6 @@ def test_the_order_of_obstacles_changes_nothing():
     )
     assert np.array_equal(one.free, other.free)
     assert np.array_equal(one.moves, other.moves)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_mirrored_world_has_the_mirrored_moves(seed):
-    world = crowd(seed)
-    mirror = World("m", world.bounds, tuple(Disc(10 - d.x, d.y, d.radius) for d in world.obstacles))
-    here, there = (rasterise(w, 0.25, 0.2) for w in (world, mirror))
-    order = [DIRECTIONS.index((dr, -dc)) for dr, dc in DIRECTIONS]
-    assert (here.free == there.free[:, ::-1]).all()
-    assert (bits(here) == bits(there)[:, ::-1][..., order]).all()
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_moved_world_has_the_same_moves(seed):
-    world = crowd(seed)
-    there = World("m", (8.0, -4.0, 18.0, 6.0), tuple(Disc(d.x + 8, d.y - 4, d.radius) for d in world.obstacles))
-    assert (rasterise(world, 0.25, 0.2).moves == rasterise(there, 0.25, 0.2).moves).all()
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_world_with_x_and_y_swapped_has_the_grid_transposed(seed):
-    world = crowd(seed)
-    swapped = World("m", world.bounds, tuple(Disc(d.y, d.x, d.radius) for d in world.obstacles))
-    here, there = (rasterise(w, 0.25, 0.2) for w in (world, swapped))
-    order = [DIRECTIONS.index((dc, dr)) for dr, dc in DIRECTIONS]
-    assert (bits(here) == bits(there).transpose(1, 0, 2)[..., order]).all()
 
 
 @given(st.integers(0, 19), st.integers(0, 29))

@@ -24,14 +24,14 @@ LONGEST_STEM = 100  # characters of the target's name in a temporary file's name
 @contextmanager
 def made_folder(folder: Path) -> Iterator[None]:
     """Create a folder and its parents; at the end, remove those that it created and that are empty."""
-    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    missing = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     try:
         yield
     finally:
         with suppress(OSError):  # not empty
-            for one in missing:
-                one.rmdir()
+            for parent in missing:
+                parent.rmdir()
 
 
 @contextmanager
@@ -104,7 +104,7 @@ def _replacing(target: Path, make: Callable[[], Path], mode: int) -> Iterator[Pa
 def _not_written(target: Path, temporary: Path, error: OSError) -> Exception:
     """Return the error of writing a target; one about another file stays what it is."""
     named = error.filename
-    if named is not None and temporary not in (one := Path(os.fsdecode(named)), *one.parents):
+    if named is not None and temporary not in (file := Path(os.fsdecode(named)), *file.parents):
         return error
     return InputError(f"{target}: cannot be written ({error.strerror or error})")
 

@@ -39,8 +39,8 @@ def value_text(value: object, longest: int = 40) -> str:
 def place(error: BaseException, home: str | None) -> str:
     """Return the last place of an error in a file, as "planner.py:12"; else the last outside antdrive; or empty."""
     places = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
-    own = (one for one in reversed(places) if one[0] == home)
-    others = (one for one in reversed(places) if not one[0].startswith((PACKAGE, STANDARD, "<")))
+    own = (at for at in reversed(places) if at[0] == home)
+    others = (at for at in reversed(places) if not at[0].startswith((PACKAGE, STANDARD, "<")))
     file, line = next(iter((*own, *others)), ("", 0))
     return f"{Path(file).name}:{line}" if file else ""
 

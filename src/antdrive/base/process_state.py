@@ -63,7 +63,7 @@ class ProcessState:
         self._folder = _folder()
         self._mask = os.umask(0o077)
         os.umask(self._mask)
-        self._handlers = [_signal.getsignal(one) for one in SIGNALS]
+        self._handlers = [_signal.getsignal(number) for number in SIGNALS]
         self._timer, self._since = system.timer(), time.perf_counter()
         self._blocked = system.signal_mask()
         self._environment = dict(_ENVIRONMENT)
@@ -90,9 +90,9 @@ class ProcessState:
             with contextlib.suppress(OSError):  # user code has removed it
                 os.chdir(self._folder)
         os.umask(self._mask)
-        for one, handler in zip(SIGNALS, self._handlers, strict=True):
-            if handler is not None and _signal.getsignal(one) is not handler:
-                _signal.signal(one, handler)
+        for number, handler in zip(SIGNALS, self._handlers, strict=True):
+            if handler is not None and _signal.getsignal(number) is not handler:
+                _signal.signal(number, handler)
         left = self._timer[0] and max(self._timer[0] - time.perf_counter() + self._since, 1e-3)
         if abs(system.timer()[0] - left) > TIMER_TOLERANCE:
             system.set_timer(left, self._timer[1])
@@ -101,8 +101,8 @@ class ProcessState:
             for key, value in self._environment.items():
                 if _ENVIRONMENT.get(key) != value:
                     os.environ[os.fsdecode(key)] = os.fsdecode(value)
-        if any(one not in sys.path for one in self._path):
-            sys.path[:] = [*self._path, *(one for one in sys.path if one not in self._path)]
+        if any(entry not in sys.path for entry in self._path):
+            sys.path[:] = [*self._path, *(entry for entry in sys.path if entry not in self._path)]
         if warnings.filters != self._filters:
             _drop_errors(self._filters)
         if gc.isenabled() != self._collects:
@@ -142,6 +142,6 @@ def _open_again(name: str, number: int, stream: Any) -> Any:
 
 def _drop_errors(before: list[Any]) -> None:
     """Remove the filters that make errors of warnings, except those from before, and restore missing ones."""
-    added = [one for one in warnings.filters if one not in before and one[0] != "error"]
+    added = [each for each in warnings.filters if each not in before and each[0] != "error"]
     warnings.resetwarnings()  # clears what Python remembers of them
     warnings.filters[:] = [*added, *before]  # type: ignore[index]

@@ -86,9 +86,9 @@ def _wanted(python: str | None = None) -> str | None:
 
     here = {"python_version": python or _python(), "sys_platform": sys.platform, "platform_machine": platform.machine()}
     for text in importlib.metadata.requires("antdrive") or ():
-        one = Requirement(text)
-        if one.name in PHYSICS and (one.marker is None or one.marker.evaluate(here)):
-            return f"{one.name}{one.specifier}"
+        requirement = Requirement(text)
+        if requirement.name in PHYSICS and (requirement.marker is None or requirement.marker.evaluate(here)):
+            return f"{requirement.name}{requirement.specifier}"
     return None
 
 

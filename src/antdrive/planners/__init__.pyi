@@ -59,9 +59,8 @@ from .smoothing.smooth import SMOOTHINGS as SMOOTHINGS
 from .smoothing.smooth import pull_taut as pull_taut
 from .smoothing.smooth import smooth as smooth
 from .user_code import record_name as record_name
-from .validation import check_plan as check_plan
 from .validation import check_step as check_step
-from .validation import checked as checked
 from .validation import request_plan as request_plan
 from .validation import require_result as require_result
-from .warmup import untimed as untimed
+from .validation import validate_plan as validate_plan
+from .validation import validated as validated

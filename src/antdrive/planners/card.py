@@ -17,7 +17,9 @@ def facts_of(planner: Planner) -> dict[str, Any]:
     """
     can = capabilities_of(planner)
     footprint = "disc, footprint without movers" if can.cell_by_cell else "disc or footprint"
-    names: list[str] = [one.name for one in dataclasses.fields(planner)] if dataclasses.is_dataclass(planner) else []
+    names: list[str] = (
+        [field.name for field in dataclasses.fields(planner)] if dataclasses.is_dataclass(planner) else []
+    )
     return {
         "about": describe(planner),
         "plans_for": footprint if can.turns else "disc",

@@ -57,7 +57,7 @@ def place_of(planner: Planner, error: BaseException | None = None) -> str:
     """Return the file and line of the planner's module that raised the error; without an error, of its `plan`."""
     kind = type(planner)
     home = getattr(sys.modules.get(kind.__module__), "__file__", None)
-    codes = [getattr(getattr(kind, name, None), "__code__", None) for name in ("plan", "_plan")]
+    codes = [getattr(getattr(kind, name, None), "__code__", None) for name in ("plan", "search")]
     code = next((code for code in codes if code and code.co_filename == home), None)
     own = f"{Path(home).name}:{code.co_firstlineno}" if home and code else kind.__module__
     return (place(error, home) if error is not None else "") or own

@@ -264,7 +264,7 @@ def _instance(made: Any, who: str, source: str = "") -> Planner:
         if not isinstance(planner, Planner) or not callable(planner.plan):
             raise _unfit(
                 f"{who} is not a planner{source}: it has no method plan(query, rng); write one, "
-                "or inherit antdrive.planners.GridPlanner and write _plan(query, rng)"
+                "or inherit antdrive.planners.GridPlanner and write search(query, rng)"
             )
         if wrong := _mismatch(planner.plan, None, None):
             raise _unfit(f"{who} is not a planner{source}: its method must be plan(query, rng) ({wrong})")
@@ -274,17 +274,17 @@ def _instance(made: Any, who: str, source: str = "") -> Planner:
 def _undeclared_options(kind: type) -> str:
     """Return how to declare options that a subclass of `GridPlanner` fails to make fields; empty if it makes all fields."""
     known: set[str] = set()
-    for one in reversed(kind.__mro__):
-        typed = {name for name, hint in vars(one).get("__annotations__", {}).items() if "ClassVar" not in str(hint)}
-        is_record = "__dataclass_fields__" in vars(one)
+    for base in reversed(kind.__mro__):
+        typed = {name for name, hint in vars(base).get("__annotations__", {}).items() if "ClassVar" not in str(hint)}
+        is_record = "__dataclass_fields__" in vars(base)
         lost = sorted(name for name in typed if not (is_record or name.startswith("_")))
-        untyped = sorted(known & set(vars(one)) - typed)
-        if issubclass(one, GridPlanner) and lost:
-            return f"the options of {one.__name__} ({', '.join(lost)}) need {DECORATOR} above the class"
+        untyped = sorted(known & set(vars(base)) - typed)
+        if issubclass(base, GridPlanner) and lost:
+            return f"the options of {base.__name__} ({', '.join(lost)}) need {DECORATOR} above the class"
         if untyped:
-            value, name = vars(one)[untyped[0]], untyped[0]
+            value, name = vars(base)[untyped[0]], untyped[0]
             typed_line = f"{name}: {type(value).__name__} = {value!r:.20}"
-            return f"{one.__name__} sets {name} without a type; write `{typed_line}`, and {DECORATOR} above the class"
+            return f"{base.__name__} sets {name} without a type; write `{typed_line}`, and {DECORATOR} above the class"
         known |= typed if is_record else set()
     return ""
 

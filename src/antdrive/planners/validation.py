@@ -62,9 +62,9 @@ def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
     return cast(PlanResult, answer)
 
 
-def checked(query: Query, answer: PlanResult) -> PlanResult:
+def validated(query: Query, answer: PlanResult) -> PlanResult:
     """Return the planner's answer if it is valid, else one without a path, with status `INVALID` and the reason."""
-    problem = check_plan(query, answer)
+    problem = validate_plan(query, answer)
     if not problem:
         # Copied: the planner may reuse its arrays.
         copies: dict[str, Any] = {key: np.array(getattr(answer, key)) for key in _arrays(answer)}
@@ -82,7 +82,7 @@ def _arrays(answer: PlanResult) -> list[str]:
     return [field.name for field in dataclasses.fields(answer) if isinstance(getattr(answer, field.name), np.ndarray)]
 
 
-def check_plan(query: Query, result: PlanResult) -> str:
+def validate_plan(query: Query, result: PlanResult) -> str:
     """Return the first error in the `result` of a planner and its place; empty if the plan is valid.
 
     Cells run from start to goal along allowed moves; their cost is that of `path_cost`. Waypoints join the same ends

@@ -8,7 +8,7 @@ import numpy as np
 
 from antdrive.base.caches import Keyed, cached
 from antdrive.base.version import versions
-from antdrive.planners import AStar, PlanResult, Query, Tangent, untimed
+from antdrive.planners import AStar, PlanResult, Query, Tangent
 from antdrive.sim.compose import avoidance_of, perception_of
 from antdrive.sim.driving.plants import Drive
 from antdrive.sim.driving.routes import by_contents, grid_of, outlined_grid_of
@@ -126,12 +126,10 @@ def optima_of(
 @cached(64)
 def _on_grid(asked: Keyed[tuple[Grid, Task]]) -> float | None:
     """Return the length of the shortest path on the grid [m]; the search is deterministic."""
-    with untimed():
-        return finite_or_none(AStar().plan(Query.between(*asked.value), random_stream(0, "optimum")).cost)
+    return finite_or_none(AStar().untimed(Query.between(*asked.value), random_stream(0, "optimum")).cost)
 
 
 @cached(64)
 def _among_discs(asked: Keyed[tuple[Grid, Task]]) -> float | None:
     """Return the length of the shortest path among the inflated discs [m]; the search is deterministic."""
-    with untimed():
-        return finite_or_none(Tangent().plan(Query.between(*asked.value), random_stream(0, "optimum")).line_length)
+    return finite_or_none(Tangent().untimed(Query.between(*asked.value), random_stream(0, "optimum")).line_length)

@@ -141,7 +141,7 @@ class Check:
             address=self.address,
             passed=evaluation.passed,
             outcome=run.outcome.key,
-            certified=run.certificate is not None and run.certificate.certified,
+            certified=run.certified,
             case="" if path is None else self.name,
             faults=evaluation.faults,
             gains=evaluation.gains,

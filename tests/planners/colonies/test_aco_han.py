@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from antdrive.planners import AcoHan, Iteration, PlanStatus, Progress, keep_best, on_progress
+from antdrive.planners import AcoHan, Iteration, PlanStatus, PotentialFieldAnts, Progress, keep_best, on_progress
 from antdrive.planners.colonies.colony import ColonyGraph, IterationState, TourConstruction, without_loops
 from tests.planners.colonies.test_colony import DIRECT, OPEN, walks
 from tests.planners.worlds_to_solve import catalogue
@@ -106,16 +106,20 @@ def test_a_returned_path_visits_no_cell_twice(world):
     assert len({tuple(c) for c in result.cells}) == len(result.cells)
 
 
-def test_the_history_records_every_iteration():
+@pytest.mark.parametrize("planner", [AcoHan(ants=50, iterations=8), PotentialFieldAnts(ants=50, iterations=20)])
+def test_the_history_records_every_iteration(planner):
     query = catalogue()["forest"]
-    result = AcoHan(ants=50, iterations=8).plan(query, np.random.default_rng(0))
-    history = result.history
-    assert len(history) == 8
+    result = planner.plan(query, np.random.default_rng(0))
+    history, arrived = result.history, result.history.arrived > 0
+    assert result.solved
+    assert len(history) == planner.iterations
     assert (np.diff(history.best) <= 0).all()
     assert history.best[-1] == pytest.approx(result.cost, abs=1e-9)
-    assert (history.iteration_best <= history.iteration_mean + 1e-9).all()
+    assert (history.iteration_best[arrived] <= history.iteration_mean[arrived] + 1e-9).all()
+    assert np.isinf(history.iteration_best[~arrived]).all()
     assert (history.best <= history.iteration_best + 1e-9).all()
-    assert ((history.arrived > 0) & (history.arrived <= 50)).all()
+    assert (history.arrived <= 50).all()
+    assert arrived.all() or not isinstance(planner, AcoHan)
     assert result.work_unit == "ant steps"
     assert result.field.shape == query.grid.shape
     assert (result.field[~query.grid.free] == 0).all()
@@ -141,14 +145,6 @@ def test_by_the_equation_alone_no_ant_leaves_a_dead_end_but_a_least_weight_lets_
     assert literal.status is PlanStatus.STOPPED
     assert "nothing arrived within 3 iterations" in literal.reason
     assert AcoHan(ants=50, iterations=3).plan(query, np.random.default_rng(0)).solved
-
-
-def test_ants_give_up_after_max_steps_and_leave_no_path():
-    query = catalogue()["empty"]
-    result = AcoHan(ants=10, iterations=2, max_steps=3).plan(query, np.random.default_rng(0))
-    assert result.status is PlanStatus.STOPPED
-    assert result.work == 10 * 2 * 3
-    assert np.isinf(result.history.best).all()
 
 
 def test_an_ant_draws_the_same_random_numbers_in_a_colony_of_any_size():

@@ -7,11 +7,8 @@ import pytest
 from antdrive.planners import MaxMinDStar, Query
 from antdrive.runs.papers.maps import environments
 from antdrive.worlds import DIRECTIONS, Grid
+from tests.planners.colonies.test_colony import solve
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query
-
-
-def solve(planner, query):
-    return planner.plan(query, np.random.default_rng(0))
 
 
 def environment_5f():

@@ -9,13 +9,10 @@ from antdrive.planners.colonies.colony import ColonyGraph
 from antdrive.planners.colonies.pfaco import AntPool
 from antdrive.runs.papers.maps import blocks
 from antdrive.worlds import DIRECTIONS, Grid
+from tests.planners.colonies.test_colony import solve
 from tests.planners.worlds_to_solve import catalogue, optimum
 
 OPEN = Query(Grid.from_free(np.ones((4, 5))), (0, 0), (3, 4))
-
-
-def solve(planner, query, seed=0):
-    return planner.plan(query, np.random.default_rng(seed))
 
 
 def test_the_potential_matches_a_hand_calculation():
@@ -200,20 +197,6 @@ def test_ants_with_generations_wait_for_the_last_before_pheromone_changes():
     )
     pool.run(trail := np.ones(4), np.ones((4, 8)), 1.0)
     assert trail == pytest.approx([(0.25 + 8.0 + 6.0) / 2] * 4)  # evaporates every tick, also after the deposits
-
-
-def test_the_history_records_every_iteration():
-    query = catalogue()["forest"]
-    result = solve(PotentialFieldAnts(ants=50, iterations=20), query)
-    history = result.history
-    assert result.solved
-    assert len(history) == 20
-    assert (np.diff(history.best) <= 0).all()
-    assert history.best[-1] == pytest.approx(result.cost)
-    arrived = history.arrived > 0
-    assert (history.iteration_best[arrived] <= history.iteration_mean[arrived] + 1e-9).all()
-    assert np.isinf(history.iteration_best[~arrived]).all()
-    assert (result.field[~query.grid.free] == 0).all()
 
 
 def test_paths_come_close_to_the_shortest():

@@ -7,7 +7,7 @@ from scipy.ndimage import distance_transform_edt
 from antdrive.planners import PlanStatus, PotentialField, Query
 from antdrive.planners.graph.apf import obstacle_distance
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
-from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
+from tests.planners.worlds_to_solve import catalogue, optimum, random_query
 
 RNG = np.random.default_rng(0)  # unused by the planner
 BARE = PotentialField(k_rep=0.0)
@@ -121,9 +121,3 @@ def test_a_goal_too_near_an_obstacle_is_not_reached():
     """The other known weakness of potential fields: repulsion moves the minimum away from the goal."""
     result = PotentialField(k_rep=5.0, influence=2.0).plan(among(Disc(4.4, 4.4, 0.2)), RNG)
     assert result.status is PlanStatus.STOPPED
-
-
-def test_no_path_is_reported_differently_from_a_local_minimum():
-    result = PotentialField().plan(sealed(), RNG)
-    assert result.status is PlanStatus.NO_PATH
-    assert "allowed moves" in result.reason

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from antdrive.base.plane import wrap_angle
-from antdrive.planners import AStar, Query, check_plan, plan_in_time, replanner_for
+from antdrive.planners import AStar, Query, plan_in_time, replanner_for, validate_plan
 from antdrive.worlds import DIRECTIONS, Disc, Task, World, rasterise
 from antdrive.worlds.headings import Outline, sweep_clearance, turn_clear
 from tests.planners.graph.test_sipp import ABOVE, BELOW, SPEED, TICK, first_tick, some_mover
@@ -77,7 +77,7 @@ def test_no_path_of_an_outline_arrives_sooner_and_none_is_missed(seeds, stay):
             first_tick(ways, starts, goals, movers, HORIZON, inflate=RADIUS, slack=slack, hurry=hurry, stay=stay)
             for slack, hurry in ((ABOVE, False), (BELOW, True))
         ]
-        assert check_plan(query, plan) == ""
+        assert validate_plan(query, plan) == ""
         assert bounds[1] - TICK - 1e-9 <= plan.duration <= bounds[0] + 1e-9
         without += math.isinf(bounds[1])
         if math.isfinite(bounds[0]):

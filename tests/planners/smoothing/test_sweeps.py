@@ -124,16 +124,12 @@ def surveyed(seeds):
     return count, faults
 
 
-def test_routes_of_footprints_keep_the_margin():
-    count, faults = surveyed(range(40))
-    assert count >= 60
-    assert not faults
-
-
-@pytest.mark.slow
-def test_hundreds_of_routes_of_footprints_keep_the_margin():
-    count, faults = surveyed(range(1000, 1250))
-    assert count >= 350
+@pytest.mark.parametrize(
+    ("seeds", "least"), [(range(40), 60), pytest.param(range(1000, 1250), 350, marks=pytest.mark.slow)]
+)
+def test_routes_of_footprints_keep_the_margin(seeds, least):
+    count, faults = surveyed(seeds)
+    assert count >= least
     assert not faults
 
 

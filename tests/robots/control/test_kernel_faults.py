@@ -7,12 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.robots import Footprint, footprint_clearance
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex, index_discs, nearby, turn_clearance
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, index_discs, nearby
 from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import full_braking, pursue, stopping_clearance, turn_in
 from antdrive.robots.control.pursuit import obstacles_around
-from antdrive.worlds import Disc, World
 from tests.robots.control.test_rules import LIMITS, TUNING
 
 WIDE = np.array([-50.0, -50.0, 50.0, 50.0])
@@ -39,29 +37,6 @@ def test_the_stopping_arc_is_that_of_a_period_and_of_braking(v, w):
         expected = np.hypot(x - disc[0, 0], y - disc[0, 1]).min() - 0.1
         found = stopping_clearance(1.0, 2.0, 0.4, v, w, deceleration, period, among(disc), math.inf)
         assert found == pytest.approx(expected, abs=1e-4), along
-
-
-@given(
-    yaw=st.floats(-math.pi, math.pi),
-    turn=st.floats(-math.pi, math.pi),
-    half=st.tuples(st.floats(0.05, 0.5), st.floats(0.05, 0.5)),
-    rounding=st.sampled_from([0.0, 0.1]),
-    discs=st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.02, 0.3)), max_size=4),
-    walls=st.tuples(*[st.floats(0.1, 1.5)] * 4),
-)
-def test_the_clearance_of_a_turn_is_the_least_of_its_headings(yaw, turn, half, rounding, discs, walls):
-    """Against the footprint's distances at 2000 headings, between which no corner moves farther than half a millimetre."""
-    at, left, low, right, high = (3.0, 2.0), *walls
-    bounds = (at[0] - left, at[1] - low, at[0] + right, at[1] + high)
-    world = World("turn", bounds, tuple(Disc(at[0] + x, at[1] + y, r) for x, y, r in discs))
-    headings = yaw + turn * np.linspace(0, 1, 2000)
-    poses = np.stack([np.full(2000, at[0]), np.full(2000, at[1]), headings], axis=1)
-    expected = footprint_clearance(world, Footprint(*half, rounding), poses).min()
-    found = turn_clearance(*at, yaw, turn, *half, rounding, np.empty((0, 2)), world.discs, np.array(bounds))
-    if expected > 0:
-        assert expected - 2e-3 <= found <= expected + 1e-9
-    else:  # by how much it would overlap does not matter
-        assert found <= 1e-9
 
 
 def test_between_two_samples_the_shorter_lookahead_counts():

@@ -136,8 +136,6 @@ def test_a_slight_corner_is_rounded_within_the_blend(turtlebot):
 
 
 def test_the_curvature_of_an_arc_is_exact_and_constant():
-    from antdrive.robots.robot_file import load_robot
-
     p = profile(around(0.44, -2.5), load_robot("jackal"), blend=0.1)
     inner = (p.arc > 0.15) & (p.arc < p.arc[-1] - 0.15)
     np.testing.assert_allclose(p.curvature[inner], -1 / 0.44, rtol=2e-3)
@@ -145,8 +143,6 @@ def test_the_curvature_of_an_arc_is_exact_and_constant():
 
 @given(st.lists(st.tuples(st.floats(0.05, 1.5), st.floats(-1.5, 1.5)), min_size=1, max_size=8), st.booleans())
 def test_all_limits_hold_on_random_routes(legs, fast_robot):
-    from antdrive.robots.robot_file import load_robot
-
     robot = load_robot("jackal" if fast_robot else "turtlebot")
     heading, points = 0.0, [np.zeros(2)]
     for length, turn in legs:
@@ -176,7 +172,7 @@ def check(p, robot):
 def test_smoothed_routes_respect_the_limits_and_are_faster_than_cell_paths(jackal):
     from antdrive.planners import AStar, Query
     from antdrive.planners.smoothing.smooth import smooth
-    from antdrive.worlds import forest, rasterise
+    from antdrive.worlds import rasterise
 
     for seed in range(4):
         task = forest(np.random.default_rng(seed), count=8, radius=(0.5, 1.5), clearance=1.0)

@@ -118,6 +118,12 @@ def test_limits_that_contradict_each_other_are_resolved_or_refused(tmp_path):
         imported("burger.urdf", given={"max_speed": 9.0})
 
 
+def plugged(inside, left="wheel_left_joint", right="wheel_right_joint"):
+    """A drive plugin of these joints with more in it."""
+    joints = f"<left_joint>{left}</left_joint><right_joint>{right}</right_joint>"
+    return f"<gazebo><plugin>{joints}{inside}</plugin></gazebo>"
+
+
 def limited(tmp_path, words):
     """The burger with a limit on both wheels."""
     path = changed(tmp_path, "burger.urdf")
@@ -171,10 +177,7 @@ def test_every_unused_limit_of_a_joint_is_named(tmp_path, words, key, value, say
     ],
 )  # fmt: skip
 def test_a_speed_that_means_no_limit_is_named_and_not_used(tmp_path, tag, told, velocity, key, value, says):
-    plugin = (
-        "<gazebo><plugin><left_joint>wheel_left_joint</left_joint><right_joint>wheel_right_joint</right_joint>"
-        f"<{tag}>{told}</{tag}></plugin></gazebo></robot>"
-    )
+    plugin = plugged(f"<{tag}>{told}</{tag}>") + "</robot>"
     limit = f'<axis xyz="0 0 1"/><limit {velocity}/>'
     found = import_urdf(changed(tmp_path, "burger.urdf", ("</robot>", plugin), ('<axis xyz="0 0 1"/>', limit)))
     assert getattr(found.spec, key) == pytest.approx(value)
@@ -251,11 +254,8 @@ def test_a_wheel_that_is_a_little_askew_adds_no_corners(tmp_path):
     ],
 )
 def test_the_lowest_torque_that_can_be_used_is_and_the_other_is_named(tmp_path, effort, plugin, torque, beside):
-    plugged = (
-        "<gazebo><plugin><left_joint>wheel_left_joint</left_joint><right_joint>wheel_right_joint</right_joint>"
-        f"<max_wheel_torque>{plugin}</max_wheel_torque></plugin></gazebo></robot>"
-    )
-    found = import_urdf(changed(tmp_path, "burger.urdf", ('effort="1.4"', f'effort="{effort}"'), ("</robot>", plugged)))
+    end = plugged(f"<max_wheel_torque>{plugin}</max_wheel_torque>") + "</robot>"
+    found = import_urdf(changed(tmp_path, "burger.urdf", ('effort="1.4"', f'effort="{effort}"'), ("</robot>", end)))
     how = comments(found)["wheel_torque"]
     assert found.spec.wheel_torque == torque
     assert how.startswith("read: ")
@@ -271,12 +271,11 @@ def test_a_negative_limit_is_refused_with_joint_and_key(tmp_path, key):
 
 
 def test_what_the_drive_plugin_says_otherwise_stands_beside_what_is_used(tmp_path):
-    plugin = (
-        "<gazebo><plugin><left_joint>wheel_left_joint</left_joint><right_joint>wheel_right_joint</right_joint>"
+    plugin = plugged(
         "<wheel_separation>0.2</wheel_separation><wheel_diameter>0.0661</wheel_diameter>"
-        "<max_linear_acceleration>0.4</max_linear_acceleration><max_wheel_torque>0.02</max_wheel_torque></plugin></gazebo></robot>"
+        "<max_linear_acceleration>0.4</max_linear_acceleration><max_wheel_torque>0.02</max_wheel_torque>"
     )
-    found = import_urdf(changed(tmp_path, "burger.urdf", ("</robot>", plugin)))
+    found = import_urdf(changed(tmp_path, "burger.urdf", ("</robot>", f"{plugin}</robot>")))
     says = comments(found)
     assert says["track"].endswith("; <wheel_separation> of the drive plugin is 0.2; check which is right")
     assert says["wheel_radius"] == "read: cylinder of link wheel_left_link", "it agrees"
@@ -389,7 +388,7 @@ def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path):
 
 
 def test_a_plugin_that_names_one_of_two_axles_chooses_it(tmp_path):
-    one = "<gazebo><plugin><left_joint>rear_left_wheel</left_joint><right_joint>rear_right_wheel</right_joint></plugin></gazebo>"
+    one = plugged("", "rear_left_wheel", "rear_right_wheel")
     text = re.sub(r"<gazebo>.*</gazebo>", one, (FIXTURES / "husky.urdf").read_text(), flags=re.DOTALL)
     path = tmp_path / "husky.urdf"
     path.write_text(text)
@@ -598,19 +597,15 @@ def test_fewer_corners_cost_little(count, squash):
 
 def test_the_yaw_of_the_axle_is_the_robots(tmp_path):
     """A model whose ahead is the root's y axis: the same robot, turned."""
-    text = (FIXTURES / "burger.urdf").read_text()
-    for old, new in (
+    path = changed(
+        tmp_path,
+        "burger.urdf",
         ('<origin xyz="-0.032 0 0.070"/>', '<origin xyz="0 -0.032 0.070" rpy="0 0 1.5707963"/>'),
         ('xyz="0 0.080 0.023" rpy="-1.5707963 0 0"', 'xyz="-0.080 0 0.023" rpy="-1.5707963 0 1.5707963"'),
         ('xyz="0 -0.080 0.023" rpy="-1.5707963 0 0"', 'xyz="0.080 0 0.023" rpy="-1.5707963 0 1.5707963"'),
         ('xyz="-0.032 0 0.167"', 'xyz="0 -0.032 0.167"'),
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    path = tmp_path / "turned.urdf"
-    path.write_text(text)
-    robot = import_urdf(path).spec
-    assert robot.footprint.bounds == pytest.approx((-0.101, -0.089, 0.037, 0.089), abs=1e-4)
+    )
+    assert import_urdf(path).spec.footprint.bounds == pytest.approx((-0.101, -0.089, 0.037, 0.089), abs=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -175,7 +175,7 @@ def test_what_the_robot_knows_of_movers_and_does_about_them_is_rebuilt():
 class Homemade(GridPlanner):
     """A planner that is not registered."""
 
-    def _plan(self, query, rng):
+    def search(self, query, rng):
         return PLANNERS["astar"].plan(query, rng)
 
 

@@ -20,7 +20,6 @@ from antdrive.worlds import (
     Disc,
     Task,
     World,
-    list_worlds,
     load_task,
     load_tasks,
     save_task,
@@ -301,11 +300,6 @@ def test_the_schema_lists_every_key_and_the_required_ones():
     assert schema["additionalProperties"] is False
     assert schema["properties"]["start"]["minItems"] == schema["properties"]["start"]["maxItems"] == 3
     assert schema["$defs"]["Disc"]["properties"]["radius"]["exclusiveMinimum"] == 0
-
-
-def test_the_catalogue_is_the_files_that_come_along():
-    assert all(path.is_file() for path in list_worlds().values())
-    assert list(list_worlds()) == sorted(list_worlds())
 
 
 # Tasks beside a world's own

@@ -156,10 +156,6 @@ class Tangent(GridPlanner):
 
     Attributes:
         bulge: maximum distance of the driven polyline's corners from an arc [m]
-        needs_world: True; the planner needs the discs themselves
-
-    Raises:
-        InputError: the query has no task, so there is no world to plan in.
     """
 
     bulge: float = 1e-3
@@ -169,10 +165,16 @@ class Tangent(GridPlanner):
     def __post_init__(self) -> None:
         require("bulge", self.bulge, above=0)
 
-    def _answer(self, query: Query, rng: np.random.Generator) -> PlanResult:
-        return self._plan(query, rng)  # the cells of the ends need not be free
+    def untimed(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Find a path, without its planning time and options."""
+        return self.search(query, rng)  # the cells of the ends need not be free
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Find the shortest path among the discs of the query's world.
+
+        Raises:
+            InputError: the query has no task, so there is no world to plan in.
+        """
         if query.task is None:
             raise InputError("query: has no task; the tangent planner needs the discs of a world")
         grid, world = query.grid, query.task.world

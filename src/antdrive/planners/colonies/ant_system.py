@@ -345,9 +345,11 @@ class MaxMinAnts(AntSystem):
                 trail.fill(tau_max)  # section 3.4
             return
         _kernels_colony.evaporate(trail.ravel(), self.evaporation)
-        one = self.depositor(state)
-        if one is not None:
-            _kernels_colony.deposit_on_arcs(trail, state.graph.to, one.cells, one.sizes, self.deposit / one.lengths)
+        tours = self.depositor(state)
+        if tours is not None:
+            _kernels_colony.deposit_on_arcs(
+                trail, state.graph.to, tours.cells, tours.sizes, self.deposit / tours.lengths
+            )
         _kernels_colony.clamp(trail.ravel(), tau_min, tau_max)
 
     def depositor(self, state: IterationState) -> Walks | None:

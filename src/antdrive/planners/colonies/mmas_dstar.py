@@ -81,7 +81,8 @@ class MaxMinDStar(GridPlanner):
         """Return hasan's robot at the query's start; it does not use `rng`."""
         return PheromoneAgent(self, query)
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Spread pheromone from the goal and descend it from the start."""
         unit = "cells propagated"
         if not reachable(query):
             return PlanResult(status=PlanStatus.NO_PATH, reason=UNREACHABLE, work_unit=unit)

@@ -48,7 +48,8 @@ class PotentialField(GridPlanner):
 
     capabilities: ClassVar[Capabilities] = Capabilities(complete=False, deterministic=True)
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Descend the potential from the start."""
         from antdrive.planners.graph import _kernels_apf  # imported here because it loads the compiler
 
         if not reachable(query):

@@ -23,7 +23,8 @@ class Dijkstra(GridPlanner):
 
     capabilities: ClassVar[Capabilities] = Capabilities(deterministic=True, turns=True)
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Search the grid without a heuristic."""
         return shortest(query, informed=False)
 
 
@@ -40,7 +41,8 @@ class AStar(GridPlanner):
 
     capabilities: ClassVar[Capabilities] = Capabilities(deterministic=True, turns=True)
 
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Search the grid with the octile distance as the heuristic."""
         return shortest(query, informed=True)
 
 

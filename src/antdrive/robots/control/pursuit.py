@@ -355,11 +355,13 @@ def controller_options() -> Mapping[str, ControllerOption]:
     """Return the controller's options by name."""
     meanings, hints = meanings_of(PurePursuit), get_type_hints(PurePursuit, include_extras=True)
     options = {}
-    for one in fields(PurePursuit):
-        marks = getattr(hints[one.name], "__metadata__", ())
-        text, _, unit = meanings[one.name].partition(" [")
+    for field in fields(PurePursuit):
+        marks = getattr(hints[field.name], "__metadata__", ())
+        text, _, unit = meanings[field.name].partition(" [")
         acts_on = next((mark for mark in marks if isinstance(mark, ActsOn)), None)
-        options[one.name] = ControllerOption(getattr(PurePursuit(), one.name), unit.removesuffix("]"), text, acts_on)
+        options[field.name] = ControllerOption(
+            getattr(PurePursuit(), field.name), unit.removesuffix("]"), text, acts_on
+        )
     return options
 
 

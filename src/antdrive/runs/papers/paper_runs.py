@@ -11,13 +11,14 @@ import statistics
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError
+from antdrive.base.records import require_choices
 from antdrive.planners import (
     Cell,
     OnlineAgent,
@@ -49,16 +50,13 @@ class FirstTouchDStar(GridPlanner):
 
     order: Literal["distance", "cost"] = "distance"
 
+    capabilities: ClassVar[Capabilities] = Capabilities(deterministic=True)
+
     def __post_init__(self) -> None:
-        if self.order not in ("distance", "cost"):
-            raise FieldError("order", f"must be 'distance' or 'cost', got {self.order!r}")
+        require_choices(self)
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """What this planner can do and needs."""
-        return Capabilities(deterministic=True)
-
-    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def search(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Spread from the goal until the start is touched."""
         from antdrive.planners.colonies import _kernels_mmas_dstar as kernels
 
         moves, cols = query.grid.moves.ravel(), query.grid.shape[1]

@@ -24,12 +24,12 @@ from antdrive.planners import (
     Query,
     TimedPlan,
     capabilities_of,
-    checked,
     planner_errors,
     replanner_for,
     request_plan,
     require_result,
     smooth,
+    validated,
 )
 from antdrive.planners.plan import Capabilities, Cell
 from antdrive.robots import Footprint, PurePursuit, RobotSpec, TrackedPath, outline_of
@@ -175,11 +175,11 @@ class RoutePlanner:
 
     def plan(self, query: Query, rng: np.random.Generator, label: str = "") -> PlanResult:
         """Plan, and check the planner's answer."""
-        return self.checked(query, request_plan(self.planner, query, rng, label))
+        return self.validated(query, request_plan(self.planner, query, rng, label))
 
-    def checked(self, query: Query, answer: PlanResult) -> PlanResult:
+    def validated(self, query: Query, answer: PlanResult) -> PlanResult:
         """Return the answer if it is valid; else note the error and return an invalid plan."""
-        plan = checked(query, answer)
+        plan = validated(query, answer)
         if plan.solved and query.grid.turns and self.footprint_margin is None:
             self.footprint_margin = max(query.grid.turns.outline.reach - self.robot.footprint.rounding, 0.0)
         if plan.status is PlanStatus.INVALID:
@@ -208,7 +208,7 @@ class RoutePlanner:
             answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
             answer = require_result(self.planner, answer)
         # A replanner knows cells only; it cannot tell that the first cell is unreachable for the robot.
-        return unreachable if query.unreachable else self.checked(query, answer)
+        return unreachable if query.unreachable else self.validated(query, answer)
 
     def observed(self, world: World, margin: float) -> Grid:
         """Return the grid of a map's discs for the disc, updated where they changed; valid until the next call."""
@@ -284,7 +284,7 @@ class OneRoute(RouteGuide):
         """Check an external plan on the grid of `first`."""
         if not plan.solved:
             return grid, plan
-        return grid, self._drivable(grid, self._routes.checked(self._routes.query(grid, self._routes.task), plan))
+        return grid, self._drivable(grid, self._routes.validated(self._routes.query(grid, self._routes.task), plan))
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
         """Return the route of a plan, and its path for the controller."""

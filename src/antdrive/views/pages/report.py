@@ -250,17 +250,13 @@ def _of_runs(
         found = [reported_run(source)] if isinstance(source, Run) else list(find_runs(Path(source)))
         if not found:
             raise InputError(f"{source}: no runs (no result.json); write them with `antdrive run --out`")
-        for run in found:
-            if run.folder is not None:
-                attachments.attach_files(run, target.parent, embed_films and page)
-            elif page:
-                run.figures.extend(attachments.drawn_figures(source) if figures else ())
-                run.films.extend(attachments.filmed(source) if films else ())
+        if isinstance(source, Run) and page:
+            found[0].figures.extend(attachments.drawn_figures(source) if figures else ())
+            found[0].films.extend(attachments.filmed(source) if films else ())
         reported += found
     if not reported:
         raise InputError(f"{target}: no runs to report")
-    if page and figures:
-        attachments.attach_figures(reported, target.parent)
+    attachments.attach_files(reported, target.parent, page=page, figures=figures, embed_films=embed_films)
     name = title or (Path(given[0]).resolve().name if len(given) == 1 and not isinstance(given[0], Run) else "runs")
     return Report(shown(name), run_table(reported), target.parent, runs=reported)
 
