@@ -6,8 +6,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from antdrive.cli.campaign_options import _planner
 from antdrive.cli.options import with_settings
+from antdrive.runs.campaigns.notation import _planner
 from antdrive.sim.forms import scenario_fields, setting_words
 from antdrive.sim.settings import SETTINGS
 from antdrive.worlds import Disc

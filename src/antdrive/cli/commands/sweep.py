@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
 from antdrive.cli import options
-from antdrive.cli.campaign_options import campaign_from
 from antdrive.cli.console import campaign_bar, print_error, show
 from antdrive.cli.exits import SUCCEEDED
 from antdrive.cli.options import argument, flag, option
@@ -80,6 +79,7 @@ def sweep(
     an error of a planner or of antdrive.
     """
     from antdrive.runs.campaigns.expanding import expand
+    from antdrive.runs.campaigns.notation import campaign_from
     from antdrive.runs.campaigns.sweeping import differences, missing_runs
     from antdrive.runs.campaigns.sweeping import sweep as make_runs
 
