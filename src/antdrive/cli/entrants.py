@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from antdrive.base.checks import grouped
 from antdrive.base.errors import FieldError, InputError
-from antdrive.cli.scenario_options import GROUPS, Setup, grouped
+from antdrive.cli.scenario_options import GROUPS, Setup
 from antdrive.planners.user_code import label_names
 
 MAX_PLANNERS = 6

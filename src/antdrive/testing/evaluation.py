@@ -86,6 +86,17 @@ class CheckResult:
             lines.append(f"film: omitted after {MOST_FILMS} films; make it with {self.commands[0]}")
         return "\n".join(lines)
 
+    def lines(self, noted: set[str]) -> list[str]:
+        """Return the result as lines, the second and later ones details.
+
+        Args:
+            noted: notes of earlier tests, which are left out; those of this test are added
+        """
+        notes = [note for note in self.notes if note not in noted]
+        noted.update(notes)
+        details = [*self.gains, *notes] if self.passed else self.message.splitlines()
+        return [f"{self.address}: {(self.accepted or 'passed') if self.passed else 'FAILED'}", *details]
+
     def as_dict(self) -> dict[str, Any]:
         """Return the result as plain values for JSON."""
         return dataclasses.asdict(self)

@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import pytest
 
 from antdrive import Run, run
-from antdrive.cli.commands import check
 from antdrive.runs.suites import Baseline
 from antdrive.sim.written import Written
 from antdrive.testing import evaluation
+from antdrive.testing.checking import check_tests
 from antdrive.views.artefacts import Results
 from antdrive.views.figures import run_figures
 
@@ -290,7 +290,9 @@ def test_a_process_for_each_core_that_may_be_used(cores, asked, started, monkeyp
         return []
 
     monkeypatch.setattr("joblib.cpu_count", lambda: cores)
-    monkeypatch.setattr("antdrive.runs.suites.select", lambda words, only: [case] * 10)
-    monkeypatch.setattr("antdrive.testing.check_cases", check_cases)
-    assert check.drive_suites(["a"], None, asked, "", Results(tmp_path), json=True) == []
+    monkeypatch.setattr("antdrive.testing.checking.select", lambda words, only: [case] * 10)
+    monkeypatch.setattr("antdrive.testing.checking.check_cases", check_cases)
+    monkeypatch.setattr("antdrive.testing.checking.unused_beside", lambda suites: [])
+    how = dict.fromkeys(("choose", "report", "progress"), print)
+    assert check_tests(["a"], only=None, jobs=asked, update="", results=Results(tmp_path), **how) == ([], [])
     assert found == [started]

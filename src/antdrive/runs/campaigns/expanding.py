@@ -55,6 +55,23 @@ class Expansion:
             scenarios.append(alike[key])
         return idle_notes(scenarios, {"seed"} if len(seeds) > 1 else ())
 
+    def lines(self, missing: int) -> Iterator[str]:
+        """Yield the size of the campaign as lines.
+
+        Args:
+            missing: number of runs that are not done
+        """
+        smoothings = dict.fromkeys(str(job.case.resolved.columns["smoothing"]) for job in self.jobs)
+        said = {"smoothing": f"smoothing {', '.join(smoothings)}"}
+        yield " x ".join(said.get(name) or _counted(name, count) for name, count in self.counts.items())
+        omitted = f"; {self.duplicates} duplicate combinations omitted" if self.duplicates else ""
+        yield f"{len(self.jobs)} runs, {missing} missing{omitted}"
+
+
+def _counted(name: str, count: int) -> str:
+    plural = count != 1 or " " in name or name == "settings"
+    return f"{count} {name if plural else name.removesuffix('s')}"
+
 
 def expand(campaign: Campaign) -> Expansion:
     """Return the runs of a campaign.

@@ -1,18 +1,18 @@
-"""Campaigns from the options of `antdrive sweep`."""
+"""Campaigns in words, as on a command line: forest:20, as:ants=10..50..20, seeds 0-9, tasks 30:5."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from antdrive.base.checks import grouped
 from antdrive.base.errors import InputError
-from antdrive.cli.scenario_options import grouped
 from antdrive.planners.user_code import record_name
+from antdrive.robots import list_robots
+from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.sim.settings import SETTINGS
-
-if TYPE_CHECKING:
-    from antdrive.runs.campaigns.campaign import Campaign
+from antdrive.worlds import list_worlds
 
 #: Option of each campaign key, for error messages.
 OPTIONS = {one.key: one.flag for one in SETTINGS.values() if one.flag} | {"robots": "--robot", "seeds": "--seeds"}
@@ -20,9 +20,16 @@ SOURCE = "the options"  # name of a campaign without a file in error messages
 
 
 def campaign_from(path: Path | None, settings: Mapping[str, Any], **words: Any) -> Campaign:
-    """Load a campaign from a file, from options, or from a file with options that override its keys."""
-    from antdrive.runs.campaigns.campaign import load_campaign, make_campaign
+    """Load a campaign from a file, from words, or from a file with words that override its keys.
 
+    Args:
+        path: the campaign file; None: the words name worlds and planners
+        settings: settings by key, as in files
+        words: `worlds`, `generate`, `planners`, `robots`, `seeds`, `tasks` and `run_limit`
+
+    Raises:
+        InputError: a word or the file is invalid; the message names the option.
+    """
     given = _keys(words, settings)
     if path is not None and not given:
         return load_campaign(path)
@@ -71,9 +78,6 @@ def _tasks(text: str) -> Any:
 
 
 def _absolute(worlds: list[Any]) -> list[Any]:
-    from antdrive.robots import list_robots
-    from antdrive.worlds import list_worlds
-
     known = {*list_worlds(), *list_robots()}
     return [str(Path(one).absolute()) if isinstance(one, str) and one not in known else one for one in worlds]
 
