@@ -280,7 +280,7 @@ def _resolving_once() -> Iterator[None]:
         _function.get_call_type = before
 
 
-class _Listener(event.Listener):  # type: ignore[misc]
+class _LoadingTime(event.Listener):  # type: ignore[misc]
     """Account for the time in which numba loads or compiles, of kernels of others, too."""
 
     def on_start(self, _: Any) -> None:
@@ -290,7 +290,7 @@ class _Listener(event.Listener):  # type: ignore[misc]
         account.__exit__()
 
 
-event.register("numba:compiler_lock", _Listener())
+event.register("numba:compiler_lock", _LoadingTime())
 
 
 def _choose_folder() -> None:
