@@ -16,8 +16,9 @@ from antdrive.planners import AStar, load_planner
 from antdrive.robots import list_robots
 from antdrive.sim import Scenario, run
 from antdrive.sim.log.record import DriveRecord, settings_of
+from antdrive.sim.recorded import command_of
 from antdrive.sim.settings import LOCALISATIONS, SETTINGS, SMOOTHINGS
-from antdrive.sim.written import Written, command_of
+from antdrive.sim.written import Written
 from antdrive.worlds import load_task
 
 METRES = st.floats(0.001, 1.0).map(lambda value: round(value, 6))
