@@ -6,6 +6,7 @@ Each benchmark lists the arguments of its smallest calls in `SMALLEST`. `tests/b
 from __future__ import annotations
 
 import argparse
+import atexit
 import json
 import subprocess
 import sys
@@ -13,11 +14,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from antdrive.base import kernel_cache
+
 MISSING = 77  # the exit code where data or packages are missing; test drivers take it for a skip
 
 
 def command_line(doc: str | None, **settings: tuple[Any, str]) -> argparse.Namespace:
-    """Parse the command line.
+    """Parse the command line; at the end of the process a line on stderr says if it measured kernels without machine code.
 
     Args:
         doc: what the benchmark does
@@ -33,7 +36,20 @@ def command_line(doc: str | None, **settings: tuple[Any, str]) -> argparse.Names
             parser.add_argument(f"--{name}", type=default, help=words)
         else:
             parser.add_argument(f"--{name}", type=type(default), default=default, help=words)
-    return parser.parse_args()
+    options = parser.parse_args()
+    compiled: list[str] = []  # also by worker processes
+    kernel_cache.on_compile = compiled.append
+    atexit.register(report_uncompiled, compiled)
+    return options
+
+
+def report_uncompiled(compiled: Sequence[str]) -> None:
+    """Print a line if kernels were compiled or ran in Python in this process."""
+    if compiled or kernel_cache.interpreted:
+        counts = (
+            f"{len(compiled)} kernels compiled and {kernel_cache.interpreted} calls of kernels ran in Python meanwhile"
+        )
+        print(f"{counts}: the times are not those of machine code; repeat after `antdrive warm`", file=sys.stderr)
 
 
 def missing(what: str) -> NoReturn:

@@ -17,6 +17,7 @@ import shutil
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -32,6 +33,8 @@ from cosmic_ray.testing import run_tests
 from cosmic_ray.work_db import use_db
 from cosmic_ray.work_item import TestOutcome, WorkItem, WorkResult
 from joblib import Parallel, delayed
+
+from benchmarks.markdown import table
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = Path("src/antdrive")  # the files of plans are named from here
@@ -190,19 +193,16 @@ def described(item: WorkItem, done: WorkResult) -> str:
     return f"{spec.module_path.relative_to(SOURCE)}:{spec.start_pos[0]} [{operator}] {was}  ->  {now}"
 
 
-def table(fates: dict[str, list[Fate]]) -> Iterator[str]:
+def report(fates: dict[str, list[Fate]]) -> Iterator[str]:
     """Yield a Markdown table of the counts by file, then each survivor. The score leaves unjudged mutants out."""
-    yield "| file | mutants | killed | of these by timeout | alive | not judged | score |"
-    yield "|---|---|---|---|---|---|---|"
-    everything = [fate for group in fates.values() for fate in group]
+    everything, rows = [fate for group in fates.values() for fate in group], []
     for name, group in [*((f"`{file}`", group) for file, group in fates.items()), ("all", everything)]:
-        late, dead, alive, unjudged = (
-            sum(one.fate == fate for one in group) for fate in ("timeout", "killed", "alive", "unjudged")
-        )
-        dead += late
-        score = f"{100 * dead / (dead + alive):.0f} %" if dead + alive else "–"
-        yield f"| {name} | {len(group)} | {dead} | {late} | {alive} | {unjudged} | {score} |"
-    yield ""
+        count = Counter(one.fate for one in group)
+        dead = count["killed"] + count["timeout"]
+        score = f"{100 * dead / (dead + count['alive']):.0f} %" if dead + count["alive"] else "–"
+        numbers = (len(group), dead, count["timeout"], count["alive"], count["unjudged"])
+        rows.append((name, *map(str, numbers), score))
+    yield from table("file | mutants | killed | of these by timeout | alive | not judged | score", rows)
     yield from (f"{one.fate}: {one.mutant}" for one in everything if one.fate in ("alive", "unjudged"))
 
 
@@ -224,7 +224,7 @@ def main(
         folder = (results or Path(temporary)).resolve()
         folder.mkdir(parents=True, exist_ok=True)
         groups = Parallel(jobs)(delayed(judged)(file, seed, folder) for file in files)
-    typer.echo("\n".join(table(dict(zip(files, groups, strict=True)))))
+    typer.echo("\n".join(report(dict(zip(files, groups, strict=True)))))
     everything = [one for group in groups for one in group]
     names = [f"[{fault['name']}]" for file in files for fault in PLANS[file].get("faults", ())]
     if any(one.fate == "alive" and any(name in one.mutant for name in names) for one in everything):

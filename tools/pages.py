@@ -248,11 +248,12 @@ def pages_with_code() -> list[Path]:
 def main(words: list[str]) -> int:
     """Run pages. Return 1 if one has problems."""
     asked = argparse.ArgumentParser(prog="python -m tools.pages", description="Run the code of pages.")
-    asked.add_argument("pages", nargs="*", type=Path.resolve, help="those of them that have code; default: all")
+    asked.add_argument("pages", nargs="*", type=Path, help="those of them that have code; default: all")
     asked.add_argument("--jobs", type=int, default=1, help="pages at a time")
     asked.add_argument("--update", action="store_true", help="write the printed output into the pages")
     given = asked.parse_args(words)
-    pages = [str(page) for page in pages_with_code() if not given.pages or page in given.pages]
+    wanted = [page.resolve() for page in given.pages]
+    pages = [str(page) for page in pages_with_code() if not wanted or page in wanted]
     if not pages:
         return 0
     jobs = ["-n", str(given.jobs), "--dist", "loadfile"] if given.jobs > 1 and not given.update else []

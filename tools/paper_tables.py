@@ -19,9 +19,8 @@ from pathlib import Path
 from antdrive.base.atomic import atomic_write
 from antdrive.runs.papers.arms import HEADS as ARM_HEADS
 from antdrive.runs.papers.arms import arm_facts, merged
-from antdrive.runs.papers.claims import CLAIMS, Claim
+from antdrive.runs.papers.claims import CLAIMS, Claim, read_table
 from antdrive.runs.papers.experiments import PAPERS
-from antdrive.runs.papers.paragraphs import paragraphs
 
 PAGES = Path(__file__).parent.parent / "docs" / "papers"
 PARAGRAPHS = PAGES.parent / "notebook" / "paper-paragraphs.md"
@@ -70,7 +69,10 @@ def paragraphs_page() -> str:
     parts = [PARAGRAPHS_HEAD]
     for paper in PAPERS:
         lines = [["lines", "place", "text", "rows", "why none, or not all of it"], ["---"] * 5]
-        lines += [[p.lines, p.place, f"“{p.quote}”", ", ".join(p.rows), p.reason] for p in paragraphs(paper)]
+        lines += [
+            [p["lines"], p["place"], f"“{p['quote']}”", p["rows"].replace(" | ", ", "), p["reason"]]
+            for p in read_table("paragraphs", paper)
+        ]
         parts.append(
             f"## {paper}\n\n`antdrive reproduce {paper} --seeds 50` tests the rows.\n\n"
             + "\n".join(_line([one.replace("|", "\\|") for one in line]) for line in lines)

@@ -64,6 +64,31 @@ class Log:
         world: dict[str, Any] = self.record["task"]
         return world
 
+    def put(self, **arrays: Array) -> Log:
+        """Replace arrays."""
+        self.arrays |= arrays
+        return self
+
+    def note(self, **values: Any) -> Log:
+        """Replace values of the record."""
+        self.record |= values
+        return self
+
+    def fill(self, value: Any, name: str, at: Any = ...) -> Log:
+        """Set the values of an array at some places, by default all."""
+        self[name][at] = value
+        return self
+
+    def plus(self, value: float, name: str, at: Any = ...) -> Log:
+        """Add to the values of an array."""
+        self[name][at] += value
+        return self
+
+    def times(self, factor: float, name: str, at: Any = ...) -> Log:
+        """Multiply the values of an array."""
+        self[name][at] *= factor
+        return self
+
     def rows(self, chosen: slice | Array) -> Log:
         """Keep only some rows, with consistent times, and their contacts."""
         count = len(self["t"])
@@ -229,36 +254,6 @@ for _value, _named in ((np.nan, "NaN"), (np.inf, "infinity"), (1e300, "1e300")):
         return log
 
 
-@forgery("rows missing in one array", "load")
-def _(log: Log) -> None:
-    log.arrays["twist"] = log["twist"][:-1]
-
-
-@forgery("a fourth column", "load")
-def _(log: Log) -> None:
-    log.arrays["pose"] = np.column_stack([log["pose"], log["pose"][:, 0]])
-
-
-@forgery("no rows", "load")
-def _(log: Log) -> Log:
-    return log.rows(slice(0))
-
-
-@forgery("a contact in a row that does not exist", "load")
-def _(log: Log) -> None:
-    log.arrays["contacts"] = np.array([[len(log["t"]) + 5.0, 0.0, -0.001, 1.0]])
-
-
-@forgery("a contact with an obstacle that does not exist", "load")
-def _(log: Log) -> None:
-    log.arrays["contacts"] = np.array([[5.0, 99.0, -0.001, 1.0]])
-
-
-@forgery("a limiter that has no name", "load")
-def _(log: Log) -> None:
-    log["limiter"][5] = 200
-
-
 # Records of no drive
 
 
@@ -391,26 +386,9 @@ def _(log: Log) -> Log:
     return log.consistent()
 
 
-@forgery("only the first row, as a success", "verify")
-def _(log: Log) -> Log:
-    log = log.rows(slice(1))
-    log.record["outcome"] = "succeeded"
-    return log
-
-
-@forgery("a full turn between two rows", "verify")
-def _(log: Log) -> None:
-    log["twist"][300:302, 1] = 2 * math.pi * log.hz
-
-
 @forgery("a speed of 800 m/s", "verify")
 def _(log: Log) -> None:
     log["twist"][:, 0] *= 800.0 / max(1e-9, float(np.abs(log["twist"][:, 0]).max()))
-
-
-@forgery("speeds three times as high", "verify")
-def _(log: Log) -> None:
-    log["twist"][:] *= 3.0
 
 
 @forgery("a slide of 4 cm/s at the end", "verify", "arrived")
@@ -457,73 +435,6 @@ def _(log: Log) -> Log:
 def _(log: Log) -> Log:
     middle = len(log["t"]) // 3
     return log.rows(np.concatenate([np.arange(middle), np.arange(middle + log.hz // 2, len(log["t"]))])).consistent()
-
-
-@forgery("time stretched by 1 %", "verify")
-def _(log: Log) -> None:
-    log["t"][:] *= 1.01
-
-
-@forgery("a heading of 7 rad", "verify")
-def _(log: Log) -> None:
-    log["pose"][:, 2] += 2 * math.pi
-
-
-@forgery("the path shifted by 5 cm", "verify")
-def _(log: Log) -> Log:
-    log["pose"][:, 1] += 0.05
-    return log.consistent()
-
-
-@forgery("the path mirrored", "verify")
-def _(log: Log) -> Log:
-    _mirror_rows(log, sum(log.world["bounds"][1::2]))
-    return log.consistent()
-
-
-@forgery("one row 5 mm aside", "verify")
-def _(log: Log) -> Log:
-    log["pose"][len(log["t"]) // 3, 1] += 0.005
-    return log.consistent()
-
-
-@forgery("a bend of 35 mm in 1 s", "verify")
-def _(log: Log) -> Log:
-    return _bent(log, 0.035, follow=False)
-
-
-@forgery("a bend of 35 mm in 1 s, speeds to match", "replay")
-def _(log: Log) -> Log:  # within what targets leave: 1 cm, 0.05 rad and what late motors explain
-    return _bent(log, 0.035, follow=True)
-
-
-@forgery("a bend of 15 cm in 1 s, speeds to match", "verify")
-def _(log: Log) -> Log:
-    return _bent(log, 0.15, follow=True)
-
-
-@forgery("a bend of 35 mm in 1 s, speeds and commands to match", "replay")
-def _(log: Log) -> Log:
-    log = _bent(log, 0.035, follow=True)
-    return _commanded(log)
-
-
-@forgery("a bend of 0.2 m over the whole drive, all to match", "replay", "arrived")
-def _(log: Log) -> Log:
-    return _commanded(_bent(log, 0.2, follow=True, whole=True))
-
-
-@forgery("a bend of 3 mm in 2 s", "replay")
-def _(log: Log) -> Log:
-    return _bent(log, 0.003, follow=False, seconds=2.0)
-
-
-@forgery("a drive that was made up", "replay", "arrived still")
-def _(log: Log) -> Log:
-    log = _bent(log, -0.15, follow=True, whole=True)
-    log = _commanded(log)
-    log.record["seed"] = 77
-    return log
 
 
 def _bent(log: Log, aside: float, *, follow: bool, seconds: float = 1.0, whole: bool = False) -> Log:
@@ -573,51 +484,26 @@ def _commanded(log: Log) -> Log:
     return log
 
 
-def _mirror_rows(log: Log, axis: float) -> None:
+def _mirrored(log: Log) -> Log:
+    axis = sum(log.world["bounds"][1::2])
     for name in ("pose", "estimate"):
         if len(log[name]):
             log[name][:, 1] = axis - log[name][:, 1]
             log[name][:, 2] *= -1
     for name in ("twist", "command", "actuated"):
         log[name][:, 1] *= -1
+    return log
+
+
+def _timed_out(log: Log) -> Log:
+    return log.note(outcome="timed_out", time_limit=float(log["t"][-1]))
+
+
+def _consistent_among_movers(log: Log) -> Log:
+    return log.consistent() if moving(log) else log
 
 
 # Commands, noise, plan
-
-
-@forgery("commands of 1e9", "verify")
-def _(log: Log) -> None:
-    log["command"][1:] *= 1e9
-
-
-@forgery("no commands", "verify")
-def _(log: Log) -> None:
-    log["command"][:] = 0.0
-
-
-@forgery("commands 10 % lower", "verify", "long")
-def _(log: Log) -> None:
-    log["command"][:] *= 0.9
-
-
-@forgery(
-    "commands 10 % lower for less than 4 s", "replay", "short"
-)  # late motors explain as much while the robot speeds up
-def _(log: Log) -> None:
-    log["command"][:] *= 0.9
-
-
-@forgery("commands and targets 10 % lower", "verify", "noisy")
-def _(log: Log) -> None:
-    log["command"][:] *= 0.9
-    log["actuated"][:] *= 0.9
-
-
-@forgery("commands 1 % lower", "replay")
-def _(log: Log) -> None:
-    log["command"][:] *= 0.99
-    if noisy(log):
-        log["actuated"][:] *= 0.99
 
 
 @forgery("commands a second early", "verify")
@@ -625,36 +511,11 @@ def _(log: Log) -> None:
     log["command"][1:] = np.concatenate([log["command"][1 + log.hz :], np.repeat(log["command"][-1:], log.hz, axis=0)])
 
 
-@forgery("a command within a control period", "verify")
-def _(log: Log) -> None:
-    log["command"][len(log["t"]) // 3 // 4 * 4 + 3] *= 0.9
-
-
-@forgery("a first command before the start", "verify")
-def _(log: Log) -> None:
-    log["command"][0] = 0.1
-
-
-@forgery("targets half as large again", "verify", "noisy")
-def _(log: Log) -> None:
-    log["actuated"][:] *= 1.5
-
-
 @forgery("targets without slip", "replay", "noisy")
 def _(log: Log) -> None:
     late = round(log.record["robot"]["noise"]["delay"] * log.record["control_hz"]) * log.hz // log.record["control_hz"]
     log.arrays["actuated"] = np.concatenate([np.zeros((late, 2)), log["command"][:-late]])
     log["actuated"][: late + 1] = 0.0
-
-
-@forgery("an estimate 5 m off", "verify", "noisy")
-def _(log: Log) -> None:
-    log["estimate"][:] += 5.0
-
-
-@forgery("an estimate without error", "replay", "noisy")
-def _(log: Log) -> None:
-    log.arrays["estimate"] = log["pose"].copy()
 
 
 @forgery("noise left out", "none", "noisy")
@@ -676,53 +537,6 @@ def _with_noise(log: Log) -> Log:
     return log
 
 
-@forgery("another seed", "none", "exact still")
-def _(log: Log) -> None:
-    log.record["seed"] += 1
-
-
-@forgery("another seed of a noisy drive", "replay", "noisy")
-def _(log: Log) -> Log:
-    log.record["seed"] += 1
-    return log.consistent() if moving(log) else log
-
-
-@forgery("another seed among movers", "verify", "moving")
-def _(log: Log) -> None:
-    log.record["seed"] += 1
-
-
-@forgery("a route of one point", "load")
-def _(log: Log) -> None:
-    log.arrays["route"] = log["route"][:1]
-
-
-@forgery("a route 50 m away", "verify")
-def _(log: Log) -> None:
-    log["route"][:] += 50.0
-
-
-@forgery("a route the wrong way round", "verify")
-def _(log: Log) -> None:
-    log.arrays["route"] = log["route"][::-1].copy()
-
-
-@forgery("a plan straight through the posts", "verify")
-def _(log: Log) -> None:
-    log.arrays["route"] = np.array([log.world["start"][:2], log.world["goal"]])
-
-
-@forgery("a plan along the wall", "verify", "arrived still")
-def _(log: Log) -> Log:
-    return _along_the_wall(log)
-
-
-@forgery("a plan along the wall, among movers", "replay", "moving")
-def _(log: Log) -> Log:
-    """Let the robot leave its route for a mover."""
-    return _along_the_wall(log)
-
-
 def _along_the_wall(log: Log) -> Log:
     (x, y, _), (gx, gy) = log.world["start"], log.world["goal"]
     low = float(log.record["inflate"]) + 0.01
@@ -733,16 +547,6 @@ def _along_the_wall(log: Log) -> Log:
 @forgery("a route with 5 m more", "verify")
 def _(log: Log) -> None:
     log.record["plan"]["length_m"] += 5.0
-
-
-@forgery("cells 99 rows away", "verify")
-def _(log: Log) -> None:
-    log["cells"][:] += 99
-
-
-@forgery("every other cell", "verify")
-def _(log: Log) -> None:
-    log.arrays["cells"] = log["cells"][::2].copy()
 
 
 @forgery("cells straight through the posts", "verify")
@@ -812,14 +616,7 @@ def _(log: Log) -> None:
 def _(log: Log) -> None:
     start = log["route"][0]
     log.arrays["route"] = np.array([start, start + (0.2, 0.0)])
-    replan = {"t": 0.0, "trigger": "decision", "solved": False, "cost_m": None, "work": 1, "route": []}
-    log.record["replans"] = [replan]
-    log.record["times"]["replans_s"] = [0.1]
-
-
-@forgery("other rules that limited the speed", "replay")
-def _(log: Log) -> None:
-    log["limiter"][:] = 0
+    _replanned(log, "decision", t=0.0)
 
 
 @forgery("a margin of 1 m, inflation to match", "verify")
@@ -831,33 +628,6 @@ def _(log: Log) -> None:
 # Outcome and end
 
 
-@forgery("no path, with rows", "verify")
-def _(log: Log) -> None:
-    log.record["outcome"] = "no_path"
-    log.arrays["contacts"] = log["contacts"][:0]
-
-
-@forgery("an invalid plan, with rows", "verify")
-def _(log: Log) -> None:
-    log.record["outcome"] = "invalid_plan"
-    log.arrays["contacts"] = log["contacts"][:0]
-
-
-@forgery("contacts left out", "verify", "collided")
-def _(log: Log) -> None:
-    log.arrays["contacts"] = log["contacts"][:0]
-    log.record["outcome"] = "stuck"
-
-
-@forgery("contacts left out, with the post", "files", "collided")
-def _(log: Log) -> Log:
-    log.arrays["contacts"] = log["contacts"][:0]
-    log.record["outcome"] = "timed_out"
-    log.record["time_limit"] = float(log["t"][-1])
-    log.record["unseen"] = []
-    return log.consistent()
-
-
 @forgery("contacts left out, the poses held back", "verify", "collided")
 def _(log: Log) -> Log:
     """Stop the robot at once, 2 cm before the post."""
@@ -867,8 +637,7 @@ def _(log: Log) -> Log:
         log[name][last:] = log[name][last]
     log["twist"][last:] = 0.0
     log.arrays["contacts"] = log["contacts"][:0]
-    log.record["outcome"] = "timed_out"
-    log.record["time_limit"] = float(log["t"][-1])
+    _timed_out(log)
     return log.consistent()
 
 
@@ -880,8 +649,7 @@ def _(log: Log) -> Log:
     log["pose"][:, 0] -= aside * np.sin(yaw)
     log["pose"][:, 1] += aside * np.cos(yaw)
     log.arrays["contacts"] = log["contacts"][:0]
-    log.record["outcome"] = "timed_out"
-    log.record["time_limit"] = float(log["t"][-1])
+    _timed_out(log)
     return log.consistent()
 
 
@@ -890,31 +658,8 @@ def _(log: Log) -> Log:
     """Cut the log where physics is genuine, and forge the time limit."""
     period = log.hz // int(log.record["control_hz"])
     log = log.rows(slice(((int(log["contacts"][0, 0]) - 8) // period - 2) * period + 1))
-    log.record["outcome"] = "timed_out"
-    log.record["time_limit"] = float(log["t"][-1])
+    _timed_out(log)
     return log
-
-
-@forgery("a collision cut off before the contact, stuck", "verify", "collided")
-def _(log: Log) -> Log:
-    log = log.rows(slice(int(log["contacts"][0, 0]) - 8))
-    log.record["outcome"] = "stuck"
-    return log
-
-
-@forgery("a contact that happens at the start", "verify", "collided")
-def _(log: Log) -> None:
-    log["contacts"][:, 0] = 3.0
-
-
-@forgery("a contact with another obstacle", "verify", "collided")
-def _(log: Log) -> None:
-    log["contacts"][:, 1] = 0.0
-
-
-@forgery("a contact of impossible depth and force", "verify", "collided")
-def _(log: Log) -> None:
-    log["contacts"][:, 2:] = (3.0, -5.0)
 
 
 @forgery("a success cut off at speed", "verify", "arrived")
@@ -923,16 +668,10 @@ def _(log: Log) -> Log:
     return log.rows(slice(int((left < log.world["goal_tolerance"]).argmax()) + 1))
 
 
-@forgery("a success cut off half way", "verify", "arrived")
-def _(log: Log) -> Log:
-    return log.rows(slice(len(log["t"]) // 2))
-
-
 @forgery("a success cut off half way, timed out", "none", "arrived")
 def _(log: Log) -> Log:
     log = log.rows(slice(len(log["t"]) // 8 * 4 + 1))
-    log.record["outcome"] = "timed_out"
-    log.record["time_limit"] = float(log["t"][-1])
+    _timed_out(log)
     log.record["replans"] = [r for r in log.record["replans"] if r["t"] <= log["t"][-1]]
     log.record["times"]["replans_s"] = log.record["times"]["replans_s"][: len(log.record["replans"])]
     return log
@@ -984,7 +723,7 @@ def _(log: Log) -> None:
 @forgery("world and drive mirrored", "files", "arrived still")
 def _(log: Log) -> Log:
     axis = sum(log.world["bounds"][1::2])
-    _mirror_rows(log, axis)
+    _mirrored(log)
     for disc in log.world["obstacles"]:
         disc["y"] = axis - disc["y"]
     (x, y, yaw), (gx, gy) = log.world["start"], log.world["goal"]
@@ -1004,13 +743,6 @@ def _(log: Log) -> Log:
     for key in ("start", "goal"):
         log.world[key][0] += 1.0
     log.world["bounds"] = [v + 1.0 * (i % 2 == 0) for i, v in enumerate(log.world["bounds"])]
-    return log.consistent()
-
-
-@forgery("a post that was not there", "none", "arrived")
-def _(log: Log) -> Log:
-    """Add an unseen cylinder, which can only make the drive harder."""
-    log.record["unseen"] = [{"x": 5.85, "y": 3.35, "radius": 0.05, "height": 1.0}]
     return log.consistent()
 
 
@@ -1049,49 +781,146 @@ def _(log: Log) -> Log:
     return log.consistent()
 
 
+def _replanned(log: Log, trigger: str = "waited", **values: Any) -> None:
+    """Let one replan be all replans, which did not succeed."""
+    replan = {"trigger": trigger, "solved": False, "cost_m": None, "work": 1, "route": [], **values}
+    log.record["replans"], log.record["times"]["replans_s"] = [replan], [0.1]
+
+
 @forgery("a replan after the end", "verify", "moving")
 def _(log: Log) -> None:
-    replan = {
-        "t": float(log["t"][-1]) + 5.0,
-        "trigger": "waited",
-        "solved": False,
-        "cost_m": None,
-        "work": 1,
-        "route": [],
-    }
-    log.record["replans"] = [*log.record["replans"], replan]
-    log.record["times"]["replans_s"] = [*log.record["times"]["replans_s"], 0.1]
+    before, times = log.record["replans"], log.record["times"]["replans_s"]
+    _replanned(log, t=float(log["t"][-1]) + 5.0)
+    log.record["replans"], log.record["times"]["replans_s"] = [*before, *log.record["replans"]], [*times, 0.1]
 
 
 @forgery("a replan that leads elsewhere", "verify", "moving")
 def _(log: Log) -> None:
-    route = [[0.4, 3.0], [0.4, 3.2]]
-    replan = {
-        "t": float(log["t"][-1]) / 2,
-        "trigger": "waited",
-        "solved": True,
-        "cost_m": 1.0,
-        "work": 1,
-        "route": route,
-    }
-    log.record["replans"] = [replan]
-    log.record["times"]["replans_s"] = [0.1]
+    _replanned(log, t=float(log["t"][-1]) / 2, solved=True, cost_m=1.0, route=[[0.4, 3.0], [0.4, 3.2]])
 
 
 @forgery("replans in a world without movers", "verify", "still")
 def _(log: Log) -> None:
-    replan = {"t": 1.0, "trigger": "waited", "solved": False, "cost_m": None, "work": 1, "route": []}
-    log.record["replans"] = [replan]
-    log.record["times"]["replans_s"] = [0.1]
+    _replanned(log, t=1.0)
 
 
-# What is left as it was
+# One change each
 
-
-@forgery("a pose edited by a picometre", "none")
-def _(log: Log) -> None:
-    """Change a value within rounding; replay reports a difference in bits."""
-    log["pose"][len(log["t"]) // 3, 0] += 1e-12
+#: By the last level at which they must be found and the drives that they are for.
+_CHANGES: dict[tuple[str, str], dict[str, Forger]] = {
+    ("load", ""): {
+        "rows missing in one array": lambda log: log.put(twist=log["twist"][:-1]),
+        "a fourth column": lambda log: log.put(pose=np.column_stack([log["pose"], log["pose"][:, 0]])),
+        "no rows": lambda log: log.rows(slice(0)),
+        "a contact in a row that does not exist": lambda log: log.put(
+            contacts=np.array([[len(log["t"]) + 5.0, 0.0, -0.001, 1.0]])
+        ),
+        "a contact with an obstacle that does not exist": lambda log: log.put(
+            contacts=np.array([[5.0, 99.0, -0.001, 1.0]])
+        ),
+        "a limiter that has no name": lambda log: log.fill(200, "limiter", 5),
+        "a route of one point": lambda log: log.put(route=log["route"][:1]),
+    },
+    ("verify", ""): {
+        "only the first row, as a success": lambda log: log.rows(slice(1)).note(outcome="succeeded"),
+        "a full turn between two rows": lambda log: log.fill(2 * math.pi * log.hz, "twist", np.s_[300:302, 1]),
+        "speeds three times as high": lambda log: log.times(3.0, "twist"),
+        "time stretched by 1 %": lambda log: log.times(1.01, "t"),
+        "a heading of 7 rad": lambda log: log.plus(2 * math.pi, "pose", np.s_[:, 2]),
+        "the path shifted by 5 cm": lambda log: log.plus(0.05, "pose", np.s_[:, 1]).consistent(),
+        "the path mirrored": lambda log: _mirrored(log).consistent(),
+        "one row 5 mm aside": lambda log: log.plus(0.005, "pose", (len(log["t"]) // 3, 1)).consistent(),
+        "a bend of 35 mm in 1 s": lambda log: _bent(log, 0.035, follow=False),
+        "a bend of 15 cm in 1 s, speeds to match": lambda log: _bent(log, 0.15, follow=True),
+        "commands of 1e9": lambda log: log.times(1e9, "command", np.s_[1:]),
+        "no commands": lambda log: log.fill(0.0, "command"),
+        "a command within a control period": lambda log: log.times(0.9, "command", len(log["t"]) // 3 // 4 * 4 + 3),
+        "a first command before the start": lambda log: log.fill(0.1, "command", 0),
+        "a route 50 m away": lambda log: log.plus(50.0, "route"),
+        "a route the wrong way round": lambda log: log.put(route=log["route"][::-1].copy()),
+        "a plan straight through the posts": lambda log: log.put(
+            route=np.array([log.world["start"][:2], log.world["goal"]])
+        ),
+        "cells 99 rows away": lambda log: log.plus(99, "cells"),
+        "every other cell": lambda log: log.put(cells=log["cells"][::2].copy()),
+        "no path, with rows": lambda log: log.put(contacts=log["contacts"][:0]).note(outcome="no_path"),
+        "an invalid plan, with rows": lambda log: log.put(contacts=log["contacts"][:0]).note(outcome="invalid_plan"),
+    },
+    ("replay", ""): {
+        # within what targets leave: 1 cm, 0.05 rad and what late motors explain
+        "a bend of 35 mm in 1 s, speeds to match": lambda log: _bent(log, 0.035, follow=True),
+        "a bend of 35 mm in 1 s, speeds and commands to match": lambda log: _commanded(_bent(log, 0.035, follow=True)),
+        "a bend of 3 mm in 2 s": lambda log: _bent(log, 0.003, follow=False, seconds=2.0),
+        "commands 1 % lower": lambda log: log.times(0.99, "command").times(0.99, "actuated"),
+        "other rules that limited the speed": lambda log: log.fill(0, "limiter"),
+    },
+    ("replay", "arrived"): {
+        "a bend of 0.2 m over the whole drive, all to match": lambda log: _commanded(
+            _bent(log, 0.2, follow=True, whole=True)
+        ),
+    },
+    ("replay", "arrived still"): {
+        "a drive that was made up": lambda log: _commanded(_bent(log, -0.15, follow=True, whole=True)).note(seed=77),
+    },
+    ("verify", "long"): {
+        "commands 10 % lower": lambda log: log.times(0.9, "command"),
+    },
+    ("replay", "short"): {
+        # late motors explain as much while the robot speeds up
+        "commands 10 % lower for less than 4 s": lambda log: log.times(0.9, "command"),
+    },
+    ("verify", "noisy"): {
+        "commands and targets 10 % lower": lambda log: log.times(0.9, "command").times(0.9, "actuated"),
+        "targets half as large again": lambda log: log.times(1.5, "actuated"),
+        "an estimate 5 m off": lambda log: log.plus(5.0, "estimate"),
+    },
+    ("replay", "noisy"): {
+        "an estimate without error": lambda log: log.put(estimate=log["pose"].copy()),
+        "another seed of a noisy drive": lambda log: _consistent_among_movers(log.note(seed=log.record["seed"] + 1)),
+    },
+    ("none", "exact still"): {
+        "another seed": lambda log: log.note(seed=log.record["seed"] + 1),
+    },
+    ("verify", "moving"): {
+        "another seed among movers": lambda log: log.note(seed=log.record["seed"] + 1),
+    },
+    ("verify", "arrived still"): {
+        "a plan along the wall": lambda log: _along_the_wall(log),
+    },
+    ("replay", "moving"): {
+        # the robot may leave its route for a mover
+        "a plan along the wall, among movers": lambda log: _along_the_wall(log),
+    },
+    ("verify", "collided"): {
+        "contacts left out": lambda log: log.put(contacts=log["contacts"][:0]).note(outcome="stuck"),
+        "a collision cut off before the contact, stuck": lambda log: log.rows(
+            slice(int(log["contacts"][0, 0]) - 8)
+        ).note(outcome="stuck"),
+        "a contact that happens at the start": lambda log: log.fill(3.0, "contacts", np.s_[:, 0]),
+        "a contact with another obstacle": lambda log: log.fill(0.0, "contacts", np.s_[:, 1]),
+        "a contact of impossible depth and force": lambda log: log.fill((3.0, -5.0), "contacts", np.s_[:, 2:]),
+    },
+    ("files", "collided"): {
+        "contacts left out, with the post": lambda log: (
+            _timed_out(log.put(contacts=log["contacts"][:0])).note(unseen=[]).consistent()
+        ),
+    },
+    ("verify", "arrived"): {
+        "a success cut off half way": lambda log: log.rows(slice(len(log["t"]) // 2)),
+    },
+    ("none", ""): {
+        # within rounding; replay reports a difference in bits
+        "a pose edited by a picometre": lambda log: log.plus(1e-12, "pose", (len(log["t"]) // 3, 0)),
+    },
+    ("none", "arrived"): {
+        # it can only make the drive harder
+        "a post that was not there": lambda log: log.note(
+            unseen=[{"x": 5.85, "y": 3.35, "radius": 0.05, "height": 1.0}]
+        ).consistent(),
+    },
+}
+for (_level, _when), _changes in _CHANGES.items():
+    KINDS |= {_name: Kind(_name, _level, forge=guarded(_change, _when)) for _name, _change in _changes.items()}
 
 
 # Broken files

@@ -10,7 +10,9 @@ from numba.core import compiler, types
 from numba.core.registry import cpu_target
 from numba.core.targetconfig import ConfigStack
 
-from antdrive.base import _kernels_compiler as compiling
+from antdrive.base import _kernels_dispatcher as compiling
+from antdrive.base._kernels_compiler import kernel
+from antdrive.base.kernel_cache import compiled
 
 CONTEXT = cpu_target.typing_context
 ROW = types.Array(types.float64, 1, "C")
@@ -41,7 +43,8 @@ def asked(monkeypatch):
     monkeypatch.setattr(compiling, "_resolved", {})
     monkeypatch.setattr(compiling, "_resolve", lambda *call: calls.append(call) or own(*call))
     CONTEXT.refresh()
-    return calls
+    with compiling._resolving_once():
+        yield calls
 
 
 @pytest.mark.parametrize(("function", "args"), CALLS)
@@ -86,3 +89,17 @@ def test_kernels_compute_what_python_does(asked):
     count = len(asked)
     assert math.isclose(numba.njit(error_model="numpy")(mixed)(row, 0.5, 1), plain(row, 0.5, 1), rel_tol=1e-15)
     assert len(asked) - count < count / 4
+
+
+def test_only_kernels_of_the_project_are_resolved_so(monkeypatch):
+    seen = []
+    resolved = compiling._call_type
+    monkeypatch.setattr(compiling, "_call_type", lambda *call: seen.append(call) or resolved(*call))
+    assert numba.njit(lambda x: x + 1.5)(2.0) == 3.5
+    assert seen == []
+    with compiled():
+        assert kernel(lambda x: x + 2.5)(2.0) == 4.5
+    assert seen
+    seen.clear()
+    assert numba.njit(lambda x: x + 3.5)(2.0) == 5.5
+    assert seen == []

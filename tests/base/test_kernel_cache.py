@@ -13,7 +13,8 @@ import numba
 import pytest
 
 from antdrive.base import kernel_cache
-from antdrive.base._kernels_compiler import _SETTINGS, _Entries, kernel
+from antdrive.base._kernels_compiler import _SETTINGS, kernel
+from antdrive.base._kernels_dispatcher import _Entries
 
 MEASURE = (
     "from antdrive.base.kernel_cache import compiled\n"

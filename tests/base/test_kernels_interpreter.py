@@ -200,7 +200,7 @@ BOTH = """
 import sys
 import numpy as np
 from numba.core.registry import CPUDispatcher
-from antdrive.base import _kernels_compiler, kernel_cache
+from antdrive.base import _kernels_dispatcher, kernel_cache
 from antdrive.base._kernels_interpreter import interpret
 from antdrive.planners import PLANNERS
 from antdrive.sim import Scenario, run
@@ -240,7 +240,7 @@ def twice(self, *args):
         assert parts[0] == parts[1], (name, found, result)
     return result
 
-_kernels_compiler._Uncompiled.__call__ = twice
+_kernels_dispatcher._Uncompiled.__call__ = twice
 for name in PLANNERS:
     warming.plan_with(name)
 warming.drive_and_film()

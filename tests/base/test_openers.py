@@ -27,7 +27,7 @@ ALLOWED = {
     "base/files.py": {"open", "os.open", "path.open"},
     "base/atomic.py": {"os.open", "temporary.write_text"},
     "base/kernel_cache.py": {"file.read_bytes", "path.read_bytes", "folder / '.gitignore'.write_text"},
-    "base/_kernels_compiler.py": {"os.open"},
+    "base/_kernels_dispatcher.py": {"os.open"},
     "base/process_state.py": {"os.fdopen"},
     "cli/app.py": {"open", "os.open", "os.fdopen"},
     "cli/commands/init.py": {"source.read_text"},
@@ -87,7 +87,7 @@ def limit():
 
 
 def test_a_pipe_among_the_machine_code_is_replaced(limit, tmp_path):
-    from antdrive.base._kernels_compiler import _Entries
+    from antdrive.base._kernels_dispatcher import _Entries
 
     entries = _Entries(str(tmp_path), "module.kernel", "stamp")
     os.mkfifo(entries._path("key"))

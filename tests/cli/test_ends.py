@@ -1,6 +1,7 @@
 """Other starts and goals in a world, from the command line and from the world's file."""
 
 import json
+import math
 from pathlib import Path
 
 from tests.cli.conftest import OFFICE
@@ -21,6 +22,18 @@ def test_plan_and_show_take_them_too(antdrive, office):
     _, out, _ = antdrive("worlds", "show", office, "--task", "dock", "--json")
     shown = json.loads(out)
     assert (shown["goal"], shown["tasks"]) == ([3.4, 2.4], ["dock"])
+
+
+def test_a_yaw_is_in_radians_or_names_degrees_and_more_than_a_turn_is_noted(antdrive, office):
+    def start(text):
+        code, out, err = antdrive("worlds", "show", office, "--start", text, "--json")
+        return code, json.loads(out)["start"], err
+
+    assert start("0.6,2.4,90deg") == (0, [0.6, 2.4, math.pi / 2], "")
+    assert start("0.6,2.4,1.5") == (0, [0.6, 2.4, 1.5], "")
+    code, pose, err = start("0.6,2.4,90")
+    assert (code, pose) == (0, [0.6, 2.4, 90.0])
+    assert err.endswith("a yaw of 90 rad is 117 degrees; write 0.6,2.4,90deg for degrees\n")
 
 
 def test_places_in_the_map_mean_the_same_as_those_in_the_world(antdrive, office):

@@ -73,6 +73,7 @@ plan office.yaml --goal 9,9
 plan tight.yaml -p astar
 render nothing.npz -o f.mp4
 render run.npz -o x.avi
+render run.npz -o x.png --at 99
 render run.npz -o x.mp4 --camera moon
 render run.npz -o x.mp4 --size big
 render run.npz run.npz -o x.png
@@ -161,8 +162,9 @@ sweep c.yaml -o out/new --report a.md --dry-run
 sweep c.yaml -o out/new --report all.doc
 sweep c.yaml -o out/new --run-limit 0
 sweep c.yaml -o out/new --seeds 1,b
-sweep c.yaml -o out/new -p as:ants
-sweep c.yaml -o out/new -p as:ants=1..x..2
+sweep c.yaml -o out/new -p as --set as.ants
+sweep c.yaml -o out/new --set as.ants=3
+sweep c.yaml -o out/new -p as --set as.ants=1..x..2
 sweep nowhere.yaml -o out
 verify nothing.npz
 verify runs

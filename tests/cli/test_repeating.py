@@ -35,7 +35,7 @@ def test_a_command_names_settings_that_differ_from_the_defaults_alone(small_run)
     assert command_of(log.record) == "antdrive run small.yaml --planner astar --robot turtlebot --seed 0"
     old = replace(log.record, written=None)
     assert command_of(old).startswith(
-        "antdrive run small.yaml --planner astar --robot turtlebot --margin 0.03 --cell 0.25"
+        "antdrive run small.yaml --planner astar --robot turtlebot --margin 0.03 --cell 0.2"
     )
     odd = replace(old, planner=replace(log.record.planner, name="Own; rm"))
     assert "--planner 'FILE.py:Own; rm'" in command_of(odd)

@@ -4,7 +4,7 @@ import pytest
 
 import antdrive
 from antdrive.base.errors import FieldError
-from antdrive.planners import GridPlanner
+from antdrive.planners import PLANNERS, GridPlanner
 from antdrive.runs.comparing import path_text
 
 FEW = {"few": "aco-han", "astar": "astar", "dijkstra": "dijkstra"}
@@ -65,12 +65,20 @@ def test_an_error_of_a_planner_is_a_row_and_the_others_drive(small_task):
         (["astar", "apf"], {"options": {"aster": {}}}, "options"),
         (["astar", "apf"], {"seeds": 0}, "seeds"),
         (["astar", "apf"], {"noise": -1.0}, "noise"),
+        (["astar", "apf"], {"progress": False}, "progress"),
+        (["astar", "astar"], {}, "planners"),
     ],
 )
 def test_invalid_arguments_are_named(small_task, planners, more, key):
     with pytest.raises(FieldError) as told:
         antdrive.compare(small_task, planners, **more)
     assert told.value.key == key
+
+
+def test_a_planner_object_is_called_by_its_class(small_task):
+    made = antdrive.compare(small_task, ["astar", PLANNERS["dijkstra"]])
+    assert made.labels == ("astar", "Dijkstra")
+    assert "astar, Dijkstra" in made.to_markdown() or "| Dijkstra |" in made.to_markdown()
 
 
 def test_worlds_of_one_name_are_refused(small_task):

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.runs.papers.claims import CLAIMS
+from antdrive.runs.papers.claims import CLAIMS, read_table
 from antdrive.runs.papers.experiments import PAPERS
-from antdrive.runs.papers.paragraphs import paragraphs
 
 SEEDS = Path(__file__).resolve().parents[3] / "shared" / "seeds"
 ORDER = ("han2007", "suganthi2019", "ibraheem2016", "lee2008", "hasan")  # of the texts, whose names begin with a number
@@ -16,10 +15,10 @@ TEXTS = {paper: path for number, paper in enumerate(ORDER) for path in SEEDS.glo
 
 @pytest.mark.parametrize("paper", PAPERS)
 def test_each_paragraph_has_rows_or_a_reason(paper):
-    listed = paragraphs(paper)
+    listed = list(read_table("paragraphs", paper))
     assert listed
-    assert [p for p in listed if not p.rows and not p.reason] == []
-    assert {name for p in listed for name in p.rows} == {
+    assert [p for p in listed if not p["rows"] and not p["reason"]] == []
+    assert {name for p in listed for name in p["rows"].split(" | ") if name} == {
         claim.id for claim in CLAIMS if claim.paper == paper and claim.kind == "claim"
     }, "ids of paragraphs and of claims differ"
 
@@ -30,10 +29,10 @@ def test_quotations_are_exact(paper):
         pytest.skip("no texts of the papers in shared/seeds")
     lines = TEXTS[paper].read_text(encoding="utf-8").split("\n")
     wrong = []
-    for p in paragraphs(paper):
-        first, _, last = p.lines.partition("-")
+    for p in read_table("paragraphs", paper):
+        first, _, last = p["lines"].partition("-")
         text = plain(" ".join(lines[int(first) - 1 : int(last or first)]))
-        wrong += [f"l. {p.lines}: {part}" for part in p.quote.split(" ... ") if plain(part) not in text]
+        wrong += [f"l. {p['lines']}: {part}" for part in p["quote"].split(" ... ") if plain(part) not in text]
     assert wrong == []
 
 

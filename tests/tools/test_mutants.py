@@ -3,7 +3,7 @@
 import pytest
 
 from tools import mutants
-from tools.mutants import FAULT, PLANS, ROOT, SOURCE, Fate, Fault, StalePlan, chosen, judged, table
+from tools.mutants import FAULT, PLANS, ROOT, SOURCE, Fate, Fault, StalePlan, chosen, judged, report
 
 
 def test_every_plan_speaks_of_code_that_exists():
@@ -78,7 +78,7 @@ def test_tests_that_fail_on_the_unchanged_code_judge_nothing_and_a_session_goes_
 
 def test_the_score_leaves_unjudged_mutants_out():
     fates = [Fate(fate, f"f.py:3 {fate}") for fate in ("killed", "killed", "timeout", "alive", "unjudged")]
-    lines = list(table({"f.py": fates}))
+    lines = list(report({"f.py": fates}))
     assert "| `f.py` | 5 | 3 | 1 | 1 | 1 | 75 % |" in lines
     assert lines[-2:] == ["alive: f.py:3 alive", "unjudged: f.py:3 unjudged"]
 

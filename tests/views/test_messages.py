@@ -38,7 +38,10 @@ def test_invalid_films_figures_exports_and_reports_are_rejected_in_one_line(made
     log, runs = drive.save(tmp_path / "rollout.npz"), made_up_runs({"a": Skill()}, worlds=2, seeds=2)
     calls = {
         "films": {f"{name} {given}": lambda n=name, g=given: film(drive, out / n, **g) for name, given in FILMS},
-        "stills": {"a.jpg": lambda: still(drive, out / "a.jpg")},
+        "stills": {
+            "a.jpg": lambda: still(drive, out / "a.jpg"),
+            "beyond the end": lambda: still(drive, out / "a.png", 99.0),
+        },
         "comparisons": {str(n): lambda n=n: compare_film([drive] * n, out / "c.mp4") for n in (1, 7)},
         "preludes": {name: lambda n=name, s=settings: preluded(n, s) for name, settings in PLANNERS},
         "figures": {"a.bmp": lambda: then_and_now(drive, drive, out / "a.bmp")},

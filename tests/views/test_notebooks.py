@@ -118,11 +118,13 @@ def test_a_bar_shows_in_notebooks_and_on_request(small_scenario, small_run, caps
         with progress_bar(wanted, "campaign") as update:
             update(3, 3)
         assert ("3 of 3 runs" in capsys.readouterr().err) == shown
-    kernel = types.SimpleNamespace(get_ipython=lambda: types.SimpleNamespace(kernel=None))
-    monkeypatch.setitem(sys.modules, "IPython", kernel)
+    shown, space = [], types.SimpleNamespace
+    monkeypatch.setitem(sys.modules, "IPython", space(get_ipython=lambda: space(kernel=None)))
+    cell = space(HTML=str, display=lambda text, display_id: space(update=shown.append))
+    monkeypatch.setitem(sys.modules, "IPython.display", cell)
     with progress_bar(None, "campaign"):
-        pass
-    assert capsys.readouterr().err.startswith("\rcampaign [")
+        assert shown[0].startswith("<pre>campaign [")
+    assert (shown[-1], capsys.readouterr().err) == ("", "")
 
 
 def moving():

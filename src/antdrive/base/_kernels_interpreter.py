@@ -33,6 +33,7 @@ SORTED = 20  # of them that sorting one element costs
 _fuel = bytearray()  # its length is what is left of the allowance: the fastest count that raises at its end
 _turn = threading.Lock()  # of the one thread that interprets
 _TICK = ast.parse("_fuel.pop()").body[0]
+_COUNTED = ast.FunctionDef | ast.For | ast.While
 _quicksort = make_py_quicksort(lt=lambda a, b: a < b or (b != b and a == a), is_argsort=True).run_quicksort
 
 
@@ -58,7 +59,7 @@ def interpret(
     arrays = list(_arrays((*args, *named.values())))
     changeable = [array for array in arrays if array.flags.writeable]
     allowance -= sum(array.size for array in changeable) // COPIED
-    if allowance <= 0 or kernel_cache.blocks or any(array.dtype == np.float32 for array in arrays):
+    if allowance <= 0 or kernel_cache.blocks or any(array.dtype.char == "f" for array in arrays):
         return 0, None
     if not _turn.acquire(blocking=False):
         return 0, None
@@ -139,14 +140,15 @@ def _is_product(node: ast.AST) -> bool:
 @functools.cache
 def _codes(file: str) -> dict[str, types.CodeType]:
     """Return the code of a file's functions, each of which counts its calls and the passes of its loops."""
-    tree = ast.parse(kernel_cache.text_of(Path(file)), file)
-    functions = [
-        node for node in tree.body if isinstance(node, ast.FunctionDef) and not any(map(_is_product, ast.walk(node)))
-    ]
-    for function in functions:
-        function.decorator_list = []
-        for node in ast.walk(function):
-            if isinstance(node, ast.For | ast.While) or node is function:
-                node.body.insert(0, ast.copy_location(_TICK, node))
-    whole = compile(ast.fix_missing_locations(ast.Module(list(functions), [])), file, "exec")
-    return {code.co_name: code for code in whole.co_consts if isinstance(code, types.CodeType)}
+    with kernel_cache.uncollected():
+        tree, functions = ast.parse(kernel_cache.text_of(Path(file)), file), list[ast.stmt]()
+        for function in tree.body:
+            nodes = list(ast.walk(function))
+            if isinstance(function, ast.FunctionDef) and not any(map(_is_product, nodes)):
+                function.decorator_list = []
+                functions.append(function)
+                for node in nodes:
+                    if isinstance(node, _COUNTED):
+                        node.body.insert(0, _TICK)
+        whole = compile(ast.Module(functions, []), file, "exec")
+        return {code.co_name: code for code in whole.co_consts if isinstance(code, types.CodeType)}

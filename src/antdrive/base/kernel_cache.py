@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import gc
 import hashlib
 import os
 import re
 import stat
 import tempfile
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
@@ -26,6 +29,7 @@ def ignore(name: str) -> None:
 COMPILING = "compiling planner, drive and film, once per installation: up to 1 min"
 on_compile: Callable[[str], None] = ignore  # called with each kernel's name before it compiles
 blocks = 0  # open blocks of `compiled`
+interpreted = 0  # calls of kernels that Python ran in this process
 
 
 @contextlib.contextmanager
@@ -37,6 +41,43 @@ def compiled() -> Iterator[None]:
         yield
     finally:
         blocks -= 1
+
+
+class _Account(threading.local):
+    """The seconds that this thread has spent in blocks that load or compile kernels, which may nest."""
+
+    depth, since, seconds = 0, 0.0, 0.0
+
+    def __enter__(self) -> None:
+        if not self.depth:
+            self.since = time.perf_counter()
+        self.depth += 1
+
+    def __exit__(self, *_: object) -> None:
+        self.depth -= 1
+        if not self.depth:
+            self.seconds += time.perf_counter() - self.since
+
+
+account = _Account()
+
+
+def clock() -> Callable[[], float]:
+    """Return a clock of the seconds from now on, except those in which this thread compiles and loads kernels."""
+    began = time.perf_counter() - account.seconds
+    return lambda: time.perf_counter() - account.seconds - began
+
+
+@contextlib.contextmanager
+def uncollected() -> Iterator[None]:
+    """Pause the garbage collector: a parser or compiler makes many objects that live until it ends."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def sources_stamp(file: Path | None = None) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import gc
 import io
 import os
 import signal
@@ -27,6 +28,7 @@ ENDS = {signal.SIGTERM: TERMINATED, **dict.fromkeys(system.signals("SIGHUP"), HU
 
 def main() -> None:
     """Run the command line and exit with its code. User code runs in a supervised child of this process."""
+    gc.set_threshold(50_000)  # instead of 700 new objects: a tenth of a short command's time
     supervision.arm(_blame)
     try:
         run_command()

@@ -20,6 +20,7 @@ LAYOUT = "\n\t"  # control characters that lines may hold
 GOOD, BAD = "✓", "✗"  # signs of success and failure
 COLOURS = {GOOD: "\033[32m{}\033[0m", BAD: "\033[31m{}\033[0m"}  # green and red
 PLAIN = {GOOD: "+", BAD: "x"}  # for streams that cannot encode the signs
+NOTED = 60.0  # between two lines about a campaign where stderr is no terminal [s]
 
 
 @contextmanager
@@ -99,19 +100,24 @@ def working(label: str) -> Iterator[Callable[[str, int], None]]:
 def campaign_bar(label: str) -> Iterator[Callable[[int, int], None]]:
     """Show a bar for many runs, with rate and time left. Yields a function that takes completed and total runs.
 
-    The rate excludes runs completed before the first call.
+    Where stderr is no terminal, a line each minute says the same. The rate excludes runs completed before the first call.
     """
     columns = ("MofNCompleteColumn", "{task.fields[note]}", "TimeElapsedColumn")
     with _progress(label, *columns, refresh_per_second=4) as show:
         first: list[float] = []
+        noted = time.monotonic()
 
         def update(done: int, size: int) -> None:
+            nonlocal noted
             now = time.monotonic()
             first[:] = first or [done, now]
             made, seconds = done - first[0], now - first[1]
             pace = f"{made / seconds:.1f} runs/s, {duration((size - done) * seconds / made)} left" if made > 0 else ""
             if show:
                 show(completed=done, total=size, note=pace)
+            elif now - noted >= NOTED and done < size:
+                noted = now
+                print_error(f"{label}: {done} of {size} runs{pace and ', '}{pace}")
 
         yield update
 

@@ -96,10 +96,7 @@ def with_plan_limit(command: Command) -> Command:
     @functools.wraps(command)
     def called(*, plan_limit: str, **values: Any) -> Any:
         os.environ[guarded.LIMIT] = plan_limit
-        try:
-            guarded.plan_limit()
-        except InputError as error:
-            raise InputError(str(error).replace(guarded.LIMIT, "--plan-limit", 1)) from None
+        guarded.plan_limit("--plan-limit")
         return command(**values)
 
     text = "Limit on the time of each plan and replan [s], or off."
@@ -178,6 +175,7 @@ World = Annotated[str, argument("WORLD", "World name or file.")]
 Log = Annotated[Path, argument("ROLLOUT", "Log of a drive, or folder of a run.")]
 Robot = Annotated[str, option("NAME", "Robot name or file.", panel="Robot")]
 Planner = Annotated[str, option("NAME", "Planner name or FILE.py:CLASS.", panel="Planner")]
+LogPlanner = Annotated[str | None, option("FILE.py:CLASS", "Class of the log's planner, if not registered.")]
 Out = Annotated[Path | None, option("FOLDER", "Output folder.  [default: a folder in out/]", panel="Output")]
 Prelude = Annotated[
     float,

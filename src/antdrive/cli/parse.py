@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from antdrive.base.checks import pair
 from antdrive.base.errors import InputError
+from antdrive.cli.console import print_error
 
 if TYPE_CHECKING:
     from antdrive.worlds import Disc
@@ -25,12 +28,18 @@ def numbers(option: str, text: str | None, count: int, form: str = "") -> tuple[
     return values
 
 
-def pair(text: str, option: str = "--set") -> tuple[str, str]:
-    """Parse KEY=VALUE of `--set` or a similar option."""
-    key, mark, value = text.partition("=")
-    if not mark or not key:
-        raise InputError(f"{option} {text}: must be KEY=VALUE")
-    return key.strip(), value.strip()
+def pose(option: str, text: str | None) -> tuple[float, ...] | None:
+    """Parse X,Y,YAW, the yaw in radians or like 90deg; None stays None. A yaw beyond a full turn is noted on stderr."""
+    place, _, yaw = (text or "").rpartition(",")
+    degrees = yaw.strip().removesuffix("deg")
+    if degrees == yaw.strip():
+        values = numbers(option, text, 3, "X,Y,YAW")
+        if values is not None and abs(values[2]) > 2 * math.pi:
+            turned = f"a yaw of {yaw.strip()} rad is {math.degrees(values[2]) % 360:.0f} degrees"
+            print_error(f"{option} {text}: {turned}; write {place},{yaw.strip()}deg for degrees")
+        return values
+    values = numbers(option, f"{place},{degrees}", 3, "X,Y,YAW")
+    return None if values is None else (*values[:2], math.radians(values[2]))
 
 
 def disc(text: str) -> Disc:
@@ -45,24 +54,20 @@ def disc(text: str) -> Disc:
         raise InputError(f"--unseen {text}: {error}") from None
 
 
+def xacro(arguments: list[str] | None, packages: list[str] | None) -> dict[str, Any]:
+    """Parse the NAME=VALUE of `--arg` and the NAME=FOLDER of `--package` for readers of robot descriptions."""
+    from antdrive.robots.importing.model import checked_packages
+
+    folders = checked_packages(dict(pair(word, "--package") for word in packages or ()))
+    return {"arguments": dict(pair(word, "--arg") for word in arguments or ()), "packages": folders}
+
+
 def size(text: str) -> tuple[int, int]:
     """Parse the width and height of a film from text such as "1280x720" [px]."""
     width, _, height = text.partition("x")
     if not (text.isascii() and width.isdigit() and height.isdigit()):
         raise InputError(f"--size {text}: must be WIDTHxHEIGHT in pixels, such as 1280x720")
     return int(width), int(height)
-
-
-def log_at(path: Path) -> Path:
-    """Return the log at a path: the file itself, or the log in a run's folder."""
-    if not path.is_dir():
-        return path
-    log = path / "rollout.npz"
-    if log.exists():
-        return log
-    ran = (path / "result.json").exists()
-    hint = "its run ended before the robot drove" if ran else "name a folder written by antdrive run"
-    raise InputError(f"{path}: contains no rollout.npz; {hint}")
 
 
 def import_target(source: Path, out: Path | None, usual: Path, what: str) -> Path:

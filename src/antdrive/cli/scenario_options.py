@@ -3,15 +3,16 @@
 import dataclasses
 import functools
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
+from antdrive.base.checks import grouped
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.version import require_physics
 from antdrive.cli.console import bar, print_error
 from antdrive.cli.options import Planner, Robot, option
-from antdrive.cli.parse import numbers, pair
+from antdrive.cli.parse import numbers, pose
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -35,7 +36,7 @@ class Ends:
         str | None,
         option(
             "X,Y,YAW",
-            "Start pose [m, m, rad].  [default: the task's]",
+            "Start pose [m, m, rad or 90deg].  [default: the task's]",
             panel="World",
         ),
     ] = None
@@ -58,7 +59,7 @@ class Ends:
 
         if self.frame not in FRAMES:
             raise InputError(f"--frame {self.frame}: unknown; choose from {', '.join(FRAMES)}")
-        given = {"start": numbers("--start", self.start, 3, "X,Y,YAW"), "goal": numbers("--goal", self.goal, 2, "X,Y")}
+        given = {"start": pose("--start", self.start), "goal": numbers("--goal", self.goal, 2, "X,Y")}
         ends = {key: list(value) for key, value in given.items() if value is not None}
         if ends and self.frame == MAP_FRAME:
             from antdrive.base.plane import map_to_world
@@ -123,15 +124,6 @@ class Setup:
         return words.scenario(at=functools.partial(at_option, words), choose=with_chosen_margin)
 
 
-def grouped(text: str, groups: Collection[str]) -> tuple[str, str, str]:
-    """Parse GROUP.KEY=VALUE of `--set`."""
-    key, value = pair(text)
-    group, _, name = key.partition(".")
-    if group not in groups or not name:
-        raise InputError(f"--set {text}: must be GROUP.KEY=VALUE; groups are {', '.join(groups)}")
-    return group, name, value
-
-
 def with_chosen_margin(scenario: "Scenario") -> "Scenario":
     """Return the scenario with a calibrated margin. Each robot and setting is calibrated once.
 
@@ -149,14 +141,3 @@ def with_chosen_margin(scenario: "Scenario") -> "Scenario":
         print_error(f"{label}: about {TYPICAL_MARGINS * DRIVES} short drives, result cached")
     with bar(label) as progress:
         return choose(scenario, lambda done, margin: progress(min(0.99, done / (TYPICAL_MARGINS * DRIVES))))
-
-
-def random_world(unknown: str, kind: str, seed: int, values: Mapping[str, str], name: str) -> "Task":
-    """Generate a random world. `unknown` starts the error message about an unknown kind."""
-    import numpy as np
-
-    from antdrive.worlds import GENERATORS, generate
-
-    if kind not in GENERATORS:
-        raise InputError(f"{unknown}; choose from {', '.join(GENERATORS)}")
-    return generate(kind, np.random.default_rng(seed), values, name=name, note=f"seed {seed}")

@@ -64,4 +64,3 @@ from .validation import request_plan as request_plan
 from .validation import require_result as require_result
 from .validation import validate_plan as validate_plan
 from .validation import validated as validated
-from .warmup import untimed as untimed

@@ -6,7 +6,6 @@ import abc
 import dataclasses
 import itertools
 import math
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -17,6 +16,7 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.errors import require
+from antdrive.base.kernel_cache import clock
 from antdrive.base.plane import polyline_length
 from antdrive.planners.errors import PlannerError, is_built_in, planner_errors
 from antdrive.planners.graph.search import UNREACHABLE, reachable
@@ -34,7 +34,6 @@ from antdrive.planners.plan import (
 )
 
 INHERIT = "inherit antdrive.planners.IterativePlanner and yield an Iteration for each"
-WARMUP_ITERATIONS = 2  # iterations that call every kernel: the second evaporates and reuses results of the first
 
 
 class Iteration(NamedTuple):
@@ -130,10 +129,6 @@ class IterativePlanner(GridPlanner):
         """Capabilities and requirements of this planner."""
         return Capabilities(iterative=True)
 
-    def for_warmup(self) -> IterativePlanner:
-        """Return this planner with few iterations that call the same kernels."""
-        return dataclasses.replace(self, iterations=min(self.iterations, WARMUP_ITERATIONS), time_budget=None)
-
     @abc.abstractmethod
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
         """Yield improving plans, until no improvement is possible or without end.
@@ -169,15 +164,15 @@ class IterativePlanner(GridPlanner):
         return self._conclude(query, done, note)
 
     def _improve(self, states: Iterator[Iteration], done: list[Iteration]) -> str:
-        deadline = math.inf if self.time_budget is None else time.perf_counter() + self.time_budget
+        budget, spent = math.inf if self.time_budget is None else self.time_budget, clock()
         callback = _progress_callback.get()
         for state in itertools.islice(states, self.iterations):
             done.append(state)
             if callback is not None:
                 callback(Progress(len(done), self.iterations, done[-1].best))
-            if time.perf_counter() >= deadline and len(done) < self.iterations:
-                spent = f"{len(done)} of {self.iterations} iterations"
-                return f"stopped by the time budget of {self.time_budget:g} s after {spent}"
+            if spent() >= budget and len(done) < self.iterations:
+                count = f"{len(done)} of {self.iterations} iterations"
+                return f"stopped by the time budget of {self.time_budget:g} s after {count}"
         return ""
 
     def _conclude(self, query: Query, done: list[Iteration], note: str) -> PlanResult:

@@ -6,7 +6,6 @@ import abc
 import dataclasses
 import enum
 import math
-import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, cast, runtime_checkable
@@ -17,9 +16,9 @@ import numpy.typing as npt
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError
 from antdrive.base.guarded import value_text
+from antdrive.base.kernel_cache import clock, compiled
 from antdrive.base.plane import format_fixed
 from antdrive.planners.errors import PlannerError, planner_errors
-from antdrive.planners.warmup import kernels_loaded
 from antdrive.worlds import MoverMotion, Task
 from antdrive.worlds.route import cells_beside
 
@@ -369,7 +368,7 @@ def capabilities_of(planner: Planner) -> Capabilities:
 class GridPlanner(abc.ABC):
     """A planner whose fields are its options.
 
-    It checks both ends, warms up the kernels, and records the planning time and the options.
+    It checks both ends, and records the planning time, without the compilation of kernels, and the options.
     """
 
     @property
@@ -379,20 +378,17 @@ class GridPlanner(abc.ABC):
 
     def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         """Find a path from the start cell to the goal cell."""
-        with kernels_loaded(self, query):
-            started = time.perf_counter()
-            result: Any = self._answer(query, rng)
-            spent = time.perf_counter() - started
+        with compiled():
+            spent = clock()
+            result: Any = self.untimed(query, rng)
+            wall_s = spent()
         if not isinstance(result, PlanResult):  # a user's `search`; `request_plan` refuses it
             return cast(PlanResult, result)
         options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        return dataclasses.replace(result, options=options, wall_s=spent)
+        return dataclasses.replace(result, options=options, wall_s=wall_s)
 
-    def for_warmup(self) -> GridPlanner:
-        """Return a copy that does minimal work with the same kernels, for a warm-up before timing."""
-        return self
-
-    def _answer(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def untimed(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Find a path, without its planning time and options: Python runs kernels that take little time."""
         blocked = query.blocked_end
         return PlanResult(status=PlanStatus.NO_PATH, reason=blocked) if blocked else self.search(query, rng)
 

@@ -244,7 +244,7 @@ def _attempt(label: str, scenario: Scenario) -> tuple[Run | PlannerError, str | 
 
 def compare(
     worlds: str | os.PathLike[str] | Task | Sequence[str | os.PathLike[str] | Task],
-    planners: Sequence[str] | Mapping[str, str | Planner],
+    planners: Sequence[str | Planner] | Mapping[str, str | Planner],
     robot: str | os.PathLike[str] | RobotSpec = "turtlebot",
     *,
     options: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
@@ -261,7 +261,7 @@ def compare(
 
     Args:
         worlds: one or several worlds of the catalogue, world files, or tasks
-        planners: names, or planners by label
+        planners: names or planners, which are called by their class; or both by label
         robot: a robot of the catalogue, a robot file, or a specification
         options: options of planners given by name, by label
         seeds: a number of seeds, from 0 on, or the seeds
@@ -274,7 +274,10 @@ def compare(
     from antdrive.sim.scenario import Scenario
 
     places = [worlds] if not isinstance(worlds, Sequence) or isinstance(worlds, str) else list(worlds)
-    named = planners if isinstance(planners, Mapping) else {name: name for name in planners}
+    listed = [] if isinstance(planners, Mapping) else [(_name_of(one), one) for one in planners]
+    named = dict(planners if isinstance(planners, Mapping) else listed)
+    if len(named) < len(listed):
+        raise FieldError("planners", "two have the same name; write {LABEL: PLANNER}")
     numbers = list(range(seeds)) if isinstance(seeds, int) else list(seeds)
     if len(named) < 2:
         raise FieldError("planners", f"a comparison needs two or more, got {_listed(list(named)) or 'none'}")
@@ -289,6 +292,10 @@ def compare(
         for label, planner in named.items()
     }
     return compare_scenarios(scenarios, numbers)
+
+
+def _name_of(planner: str | Planner) -> str:
+    return planner if isinstance(planner, str) else type(planner).__name__
 
 
 def compare_scenarios(

@@ -5,13 +5,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 from typing import NamedTuple
 
-from antdrive.base.kernel_cache import compiled
-from antdrive.planners import GridPlanner
 from antdrive.robots import LIMITERS, Avoidance
 from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
@@ -35,17 +32,15 @@ from antdrive.sim.driving.rules import (
 )
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverDetector, MoverTracking, SimulatedLidar, Survey
-from antdrive.sim.policy import OBSTRUCTED, Perception, ReplanPolicy
+from antdrive.sim.policy import Perception
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
-from antdrive.worlds import Cruising, Disc, Task, World
+from antdrive.worlds import Task, World
 
 DRIFTING_SHARE = 0.6  # `GOAL_SHARE` of a mapless robot that tracks movers by lidar
 BLIND_SHARE = (
     0.3  # such a robot backs into its blind sector at this fraction of its top speed, unless it avoids a mover
 )
-
-_rehearsed: set[str] = set()  # keys of the replanning warm-ups in this process
 
 
 class Parts(NamedTuple):
@@ -56,9 +51,6 @@ class Parts(NamedTuple):
     guide: RouteGuide
     rules: tuple[Rule, ...]  # in order of application
     logs: tuple[Logs, ...]
-    perception: Perception | None  # perception of movers
-    avoidance: Avoidance | None  # avoidance of movers
-    replanning: ReplanPolicy | None  # when to replan
     limiters: tuple[str, ...]  # names of the rules that limit the speed
     mapped: bool  # whether plans use the given map
 
@@ -110,9 +102,6 @@ def compose(s: Scenario) -> Parts:
         guide,
         tuple(rules),
         tuple(part for part in (localiser, guide, scans, tracking) if part is not None),
-        perception=perception if moving else None,
-        avoidance=avoidance if moving else None,
-        replanning=s.replanning if moving or survey else None,
         limiters=EXPLORING_LIMITERS if survey else LIMITERS,
         mapped=mapped,
     )
@@ -206,25 +195,3 @@ def _lidar(s: Scenario) -> Lidar:
 def _sensor(s: Scenario) -> SimulatedLidar:
     """Simulate the lidar in the driven world."""
     return SimulatedLidar.of(_lidar(s), s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)
-
-
-def warm_up_replanning(s: Scenario) -> None:
-    """Replan twice in a tiny world, once per process and planner, so that replan times exclude the loading of kernels."""
-    if not s.driven_world.movers or s.replanning is None or not isinstance(s.planner, GridPlanner):
-        return
-    planner = s.planner.for_warmup()
-    key = f"{type(planner).__module__}.{planner!r} {s.map} {s.smoothing} {s.known_perception.kind} {s.replanning}"
-    if key in _rehearsed:
-        return
-    _rehearsed.add(key)
-    unit, hz = s.inflate, s.control_hz
-    mover = Cruising(radius=unit, position=(8 * unit, 11 * unit), velocity=(0.1 * unit, 0.0))
-    world = World("tiny", (0.0, 0.0, 24 * unit, 24 * unit), (Disc(12 * unit, 12 * unit, 2 * unit),), movers=(mover,))
-    task = Task(world, (4 * unit, 4 * unit, 0.0), (20 * unit, 20 * unit), goal_tolerance=unit, cell=unit)
-    with contextlib.suppress(Exception), compiled():  # the same error recurs in the timed run
-        guide = compose(dataclasses.replace(s, task=task, planner=planner, cell=None, unseen=())).guide
-        grid, answer = guide.first()
-        if answer.solved:
-            guide.route(grid, answer)
-            for tick in (0, 5 * hz):
-                guide.replan(tick, task.start, OBSTRUCTED)

@@ -11,7 +11,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.progress import progress_bar
 from antdrive.base.version import require_physics
 from antdrive.planners import PlanResult, PlanStatus
-from antdrive.sim.compose import compose, warm_up_replanning
+from antdrive.sim.compose import compose
 from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.facts import LoggedRun, result_of
@@ -64,9 +64,14 @@ class Run:
         return self.rollout.record.reason if self.rollout is not None else self.plan.reason
 
     @property
+    def certified(self) -> bool:
+        """Whether the drive is certified free of contact."""
+        return self.certificate is not None and self.certificate.certified
+
+    @property
     def succeeded(self) -> bool:
         """Whether the robot stopped at the goal in time, certified free of contact."""
-        return self.outcome is Outcome.SUCCEEDED and self.certificate is not None and self.certificate.certified
+        return self.outcome is Outcome.SUCCEEDED and self.certified
 
     @functools.cached_property
     def logged(self) -> LoggedRun | None:
@@ -91,7 +96,7 @@ class Run:
         log = self._driven()
         if name not in METRICS:
             raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
-        return METRICS[name](log.rollout)
+        return log.metrics[name]
 
     def _driven(self) -> LoggedRun:
         if self.logged is None:
@@ -118,7 +123,7 @@ class Run:
             lines = [(self.rollout.route, ROUTE_COLOUR, True), (self.rollout.pose[::12, :2], LINE, False)]
             facts["time"] = f"{self.rollout.t[-1]:.1f} s"
             facts["minimum clearance"] = f"{self.rollout.clearance.min():.3f} m"
-            facts["certified"] = "yes" if self.certificate and self.certificate.certified else "no"
+            facts["certified"] = "yes" if self.certified else "no"
         if self.reason:
             facts["reason"] = self.reason
         return card(picture_of(s, lines), f"{s.task.world.name}: {self.outcome.value}", facts)
@@ -170,7 +175,6 @@ def driven(
         return grid, answer, None
     route, path = parts.guide.route(grid, answer)
     limit = s.time_limit or s.task.time_limit or usual_time_limit(route.length, s.robot, s.noise)
-    warm_up_replanning(s)
     started = time.perf_counter()
     driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz)
     with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories) as engine:

@@ -8,7 +8,8 @@ import numpy as np
 
 from antdrive.base.caches import Keyed, cached
 from antdrive.base.version import versions
-from antdrive.planners import AStar, PlanResult, Query, Tangent, untimed
+from antdrive.planners import AStar, PlanResult, Query, Tangent
+from antdrive.sim.compose import avoidance_of, perception_of
 from antdrive.sim.driving.plants import Drive
 from antdrive.sim.driving.routes import by_contents, grid_of, outlined_grid_of
 from antdrive.sim.log.record import (
@@ -39,7 +40,7 @@ def rollout_of(
 ) -> Rollout:
     """Assemble the log of a scenario's drive, with its time limit [s] and its wall time [s]."""
     record = DriveRecord(
-        **configuration_of(s, parts, grid, answer),
+        **configuration_of(s, grid, answer),
         plan=_plan_record(s, parts.guide.footprint_margin, grid, answer),
         smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
         replans=tuple(parts.guide.log),
@@ -62,9 +63,10 @@ def rollout_of(
     return Rollout(**arrays, record=record)
 
 
-def configuration_of(s: Scenario, parts: Parts, grid: Grid, answer: PlanResult) -> dict[str, Any]:
+def configuration_of(s: Scenario, grid: Grid, answer: PlanResult) -> dict[str, Any]:
     """Return the fields of a scenario's record that a drive does not change, except its time limit and smoothing."""
-    perception, avoidance, replanning = parts.perception, parts.avoidance, parts.replanning
+    perception, avoidance = (perception_of(s), avoidance_of(s)) if s.moving else (None, None)
+    replanning = s.replanning if s.moving or s.map == "none" else None
     return {
         "task": s.task,
         "unseen": s.unseen,
@@ -124,12 +126,10 @@ def optima_of(
 @cached(64)
 def _on_grid(asked: Keyed[tuple[Grid, Task]]) -> float | None:
     """Return the length of the shortest path on the grid [m]; the search is deterministic."""
-    with untimed():
-        return finite_or_none(AStar().plan(Query.between(*asked.value), random_stream(0, "optimum")).cost)
+    return finite_or_none(AStar().untimed(Query.between(*asked.value), random_stream(0, "optimum")).cost)
 
 
 @cached(64)
 def _among_discs(asked: Keyed[tuple[Grid, Task]]) -> float | None:
     """Return the length of the shortest path among the inflated discs [m]; the search is deterministic."""
-    with untimed():
-        return finite_or_none(Tangent().plan(Query.between(*asked.value), random_stream(0, "optimum")).line_length)
+    return finite_or_none(Tangent().untimed(Query.between(*asked.value), random_stream(0, "optimum")).line_length)

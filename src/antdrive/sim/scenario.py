@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 import numpy as np
 
 from antdrive.base import Floats
+from antdrive.base.checks import suggest
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_position
 from antdrive.planners import Planner, capabilities_of
@@ -181,6 +182,9 @@ class Scenario(Settings):
         """
         from antdrive.sim.written import Written
 
+        for name in settings:
+            if name not in {one.name for one in dataclasses.fields(cls)}:
+                raise FieldError(name, f"unknown setting; {suggest(name, SETTINGS)}")
         if not isinstance(planner, str) and options:
             raise FieldError("options", "need a planner's name; set the options of a planner object itself")
         words: dict[str, Any] = {"options": options or {}}

@@ -86,6 +86,17 @@ class CheckResult:
             lines.append(f"film: omitted after {MOST_FILMS} films; make it with {self.commands[0]}")
         return "\n".join(lines)
 
+    def lines(self, noted: set[str]) -> list[str]:
+        """Return the result as lines, the second and later ones details.
+
+        Args:
+            noted: notes of earlier tests, which are left out; those of this test are added
+        """
+        notes = [note for note in self.notes if note not in noted]
+        noted.update(notes)
+        details = [*self.gains, *notes] if self.passed else self.message.splitlines()
+        return [f"{self.address}: {(self.accepted or 'passed') if self.passed else 'FAILED'}", *details]
+
     def as_dict(self) -> dict[str, Any]:
         """Return the result as plain values for JSON."""
         return dataclasses.asdict(self)
@@ -130,7 +141,7 @@ class Check:
             address=self.address,
             passed=evaluation.passed,
             outcome=run.outcome.key,
-            certified=run.certificate is not None and run.certificate.certified,
+            certified=run.certified,
             case="" if path is None else self.name,
             faults=evaluation.faults,
             gains=evaluation.gains,
@@ -267,10 +278,8 @@ def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> 
     except FieldError as error:
         outcome, fault, raised = INVALID_INPUT, str(case.error(error.key, error.problem)), error
     except InputError as error:
-        placed = (
-            case.error(error.key, error.problem) if error.key else error
-        )  # found in the run, such as a cell too small
-        outcome, fault, raised = INVALID_INPUT, str(placed), error
+        fault = str(case.error(error.key, error.problem) if error.key else error)  # such as a cell that is too small
+        outcome, raised = INVALID_INPUT, error
     except Exception as error:  # user planners may raise anything
         outcome, fault, raised = INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}", error
     return _check_of(case, update, results).failed_early(outcome, fault, raised)

@@ -71,6 +71,17 @@ def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bo
     yield from unused_lines(unused, strict)
 
 
+def summary_lines(results: Sequence[CheckResult], unused: Sequence[str], strict: bool) -> Iterator[str]:
+    """Yield the unused baselines, and the numbers of passed tests and of missing films, as lines."""
+    yield from unused_lines(unused, strict)
+    passed = [result for result in results if result.passed]
+    better = sum(bool(result.gains) for result in passed)
+    gained = f"; {better} better than the baseline: renew it with antdrive accept" if better else ""
+    yield f"{len(passed)} of {len(results)} passed{gained}"
+    if unfilmed := sum(result.unfilmed for result in results):
+        yield films_omitted(unfilmed, "--film always")
+
+
 def unused_lines(unused: Sequence[str], strict: bool) -> Iterator[str]:
     """Return one line per unused baseline."""
     return (f"{'FAILED: ' if strict else ''}unused baseline: {path}; remove it" for path in unused)

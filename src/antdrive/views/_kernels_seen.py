@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from antdrive.views.film._kernels_paint import pixel_box
+from antdrive.views.film._kernels_paint import ground_at, pixel_box
 from antdrive.worlds._kernels import Array, inline, kernel
 
 
@@ -45,10 +45,7 @@ def veil(
     height, width = visible.shape
     for row in range(0, height, 2):
         for col in range(0, width, 2):
-            px, py = col + 1.0, row + 1.0
-            w = inv[2, 0] * px + inv[2, 1] * py + inv[2, 2]
-            x = (inv[0, 0] * px + inv[0, 1] * py + inv[0, 2]) / w
-            y = (inv[1, 0] * px + inv[1, 1] * py + inv[1, 2]) / w
+            x, y, w = ground_at(inv, col + 1.0, row + 1.0)
             if x < bounds[0] or x > bounds[2] or y < bounds[1] or y > bounds[3]:
                 continue
             u = (shift[0] * x - shift[1] * y + shift[2] - corner[0]) / corner[2] - 0.5
@@ -134,10 +131,8 @@ def lay_fan(
         for col in range(left, right):
             if visible[row, col] <= 0.0:
                 continue
-            px, py = col + 0.5, row + 0.5
-            w = inv[2, 0] * px + inv[2, 1] * py + inv[2, 2]
-            dx = (inv[0, 0] * px + inv[0, 1] * py + inv[0, 2]) / w - eye[0]
-            dy = (inv[1, 0] * px + inv[1, 1] * py + inv[1, 2]) / w - eye[1]
+            x, y, _ = ground_at(inv, col + 0.5, row + 0.5)
+            dx, dy = x - eye[0], y - eye[1]
             away = math.sqrt(dx * dx + dy * dy)
             if away >= far:
                 continue

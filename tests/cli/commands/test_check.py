@@ -10,9 +10,10 @@ from xml.etree import ElementTree
 import pytest
 
 from antdrive import Run, run
-from antdrive.cli.commands import check
 from antdrive.runs.suites import Baseline
+from antdrive.sim.written import Written
 from antdrive.testing import evaluation
+from antdrive.testing.checking import check_tests
 from antdrive.views.artefacts import Results
 from antdrive.views.figures import run_figures
 
@@ -222,6 +223,8 @@ def test_ci_gets_junit_a_summary_and_unused_baselines(antdrive, suite, monkeypat
 PYTHON = """
 import pytest
 
+from antdrive.sim.written import Written
+
 def test_named(drive):
     drive("small.yaml", "astar")
 
@@ -280,14 +283,16 @@ def test_processes_change_nothing(antdrive, suite):
 def test_a_process_for_each_core_that_may_be_used(cores, asked, started, monkeypatch, tmp_path):
     """joblib counts those of a container; the operating system says how many its host has."""
     found: list[int] = []
-    case = SimpleNamespace(given={"margin": 0.03})
+    case = SimpleNamespace(written=Written(world="empty"))
 
     def check_cases(cases, *, jobs, **others):
         found.append(jobs)
         return []
 
     monkeypatch.setattr("joblib.cpu_count", lambda: cores)
-    monkeypatch.setattr("antdrive.runs.suites.select", lambda words, only: [case] * 10)
-    monkeypatch.setattr("antdrive.testing.check_cases", check_cases)
-    assert check.drive_suites(["a"], None, asked, "", Results(tmp_path), json=True) == []
+    monkeypatch.setattr("antdrive.testing.checking.select", lambda words, only: [case] * 10)
+    monkeypatch.setattr("antdrive.testing.checking.check_cases", check_cases)
+    monkeypatch.setattr("antdrive.testing.checking.unused_beside", lambda suites: [])
+    how = dict.fromkeys(("choose", "report", "progress"), print)
+    assert check_tests(["a"], only=None, jobs=asked, update="", results=Results(tmp_path), **how) == ([], [])
     assert found == [started]

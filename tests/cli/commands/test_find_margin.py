@@ -6,8 +6,7 @@ import re
 
 import pytest
 
-from antdrive.cli.commands.find_margin import _lines
-from antdrive.runs.margins.choice import MarginResult
+from antdrive.runs.margins.choice import MarginResult, MarginSearch
 from antdrive.sim import Scenario
 
 
@@ -27,7 +26,7 @@ def test_the_answer_says_how_many_worlds_it_rests_on():
     """A margin that closes nine worlds of ten is safe in one."""
     closing = MarginResult(margin=0.2, drives=0, impassable=10, failed=None, left=math.inf)
     trials = [closing, MarginResult(margin=0.1, drives=1, impassable=9, failed=None, left=0.02)]
-    *_, said = _lines(Scenario.of("empty", "astar"), trials, 0.1)
+    *_, said = MarginSearch(Scenario.of("empty", "astar"), trials).lines()
     assert said.endswith(": 0.100 m, from 1 drive; 9 more worlds have no path with this margin")
-    *_, said = _lines(Scenario.of("empty", "astar"), trials[:1], None)
+    *_, said = MarginSearch(Scenario.of("empty", "astar"), trials[:1]).lines()
     assert said.endswith(": none up to 0.2 m")

@@ -25,7 +25,7 @@ from antdrive.runs.margins.choice import (
     least_margin,
     predicted_loss,
 )
-from antdrive.runs.margins.loss import Loss, calibration_key, course, least_bound, loss_on_course
+from antdrive.runs.margins.loss import Loss, calibration_key, course, loss_on_course
 from antdrive.sim import Scenario, run
 from antdrive.sim.driving.rules import Pursuit
 from antdrive.sim.scenario import LossFactors
@@ -107,12 +107,6 @@ def test_courses_differ_by_seed_and_only_by_seed():
 
 def conditions(robot, **changes):
     return LossFactors(**{"robot": robot, "controller": PurePursuit(), "noise": 1.0, "smoothing": "taut", **changes})
-
-
-def test_the_bound_is_that_of_the_certificate(small_run, collided_run):
-    for done in (small_run, collided_run):
-        found = least_bound(done.rollout, done.scenario.robot.radius, done.rollout.clearance)
-        assert found == pytest.approx(done.certificate.bound, abs=1e-9)
 
 
 @pytest.mark.parametrize("smoothing", ["none", "taut", "clearance"])
@@ -373,8 +367,3 @@ def test_a_choice_counts_as_long_as_its_conditions_hold(made_up, small_scenario)
 def test_plans_in_space_and_time_are_not_smoothed(turtlebot):
     assert Scenario.of("plaza-moving", "sipp", turtlebot).loss_factors.smoothing == "none"
     assert Scenario.of("plaza-moving", "astar", turtlebot).loss_factors.smoothing == "clearance"
-
-
-def test_words_are_no_margin(small_scenario):
-    with pytest.raises(FieldError, match="margin: must be a number, got 'wide'"):
-        Scenario.of(small_scenario.task, margin="wide")

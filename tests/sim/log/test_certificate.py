@@ -95,6 +95,22 @@ def test_verify_needs_neither_physics_nor_compiler(log, tmp_path):
     assert ": certified collision-free: " in done.stdout
 
 
+@given(st.integers(0, 2**32 - 1), st.floats(0, 3), st.integers(1, 60), st.floats(0.01, 10))
+def test_no_disc_that_is_left_out_is_the_nearest_to_a_footprint(seed, step, count, size):
+    """Whatever the path: the nearest of all discs, by plain distances of points, is among those checked."""
+    rng = np.random.default_rng(seed)
+    discs = np.column_stack([rng.uniform(-size, size, (count, 2)), rng.uniform(0, size / 2, count)])
+    x, y = np.cumsum(rng.normal(0, step, (2, 12)), axis=1)
+    radius = rng.uniform(0, size / 2)
+    ((_, looked_at),) = certificate._blocks(np.column_stack([x, y]), radius, discs)
+    near = {tuple(disc) for disc in looked_at.tolist()}
+    # A footprint of this radius reaches between 0 and `radius` towards a disc: the nearest one is that for some reach.
+    for px, py in zip(x, y, strict=True):
+        apart = np.hypot(discs[:, 0] - px, discs[:, 1] - py) - discs[:, 2]
+        reaches = rng.uniform(0, radius, (40, count))
+        assert {tuple(discs[k]) for k in (apart - reaches).argmin(axis=1)} <= near
+
+
 PLAIN = drive(0.5, rows=200)
 REPLAN = ReplanRecord(t=0.2, trigger="waited", solved=True, cost_m=1.0, work=1, route=((1.1, 1.0), (5.0, 1.0)))
 ARRAYS = ("t", "pose", "twist", "command", "clearance", "limiter", "movers", "contacts", "route", "cells")

@@ -199,16 +199,21 @@ def test_discs_stand_out_of_the_surface_by_half_a_grain():
 def test_a_map_grows_and_keeps_what_it_holds():
     scanner = Scanner(EYE, POSTS)
     small = OccupancyMap(EYE, horizon=3.0)
+    laid_out = OccupancyMap(EYE, horizon=3.0, goal=(-9.9, 8.8))
     large = OccupancyMap(EYE, horizon=3.0, bounds=(-30.0, -30.0, 30.0, 30.0))
     for k in range(12):
         pose = (-0.9 * k, 0.8 * k, 2.0 - 0.1 * k)
         ranges = scanner.scan(pose)
-        small.insert(pose, ranges)
-        large.insert(pose, ranges)
-    assert small.layouts > 1
-    assert small.seen_free.sum() == large.seen_free.sum()
-    order = np.lexsort(small.discs().T), np.lexsort(large.discs().T)
-    np.testing.assert_allclose(small.discs()[order[0]], large.discs()[order[1]], atol=1e-6)
+        for grid in (small, laid_out, large):
+            grid.insert(pose, ranges)
+    assert small.layouts > laid_out.layouts == 1
+    assert small.seen_free.sum() == laid_out.seen_free.sum() == large.seen_free.sum()
+    discs = [grid.discs()[np.lexsort(grid.discs().T)] for grid in (small, laid_out, large)]
+    np.testing.assert_allclose(discs[:2], [discs[2]] * 2, atol=1e-6)
+    cells = [
+        np.argwhere(grid.occupied) + np.round(np.divide(grid.origin[::-1], 0.05)) for grid in (small, laid_out, large)
+    ]
+    assert cells[0].tolist() == cells[1].tolist() == cells[2].tolist()
 
 
 def test_nothing_is_entered_beyond_fixed_bounds():
@@ -312,18 +317,6 @@ def test_points_on_ground_that_was_free_are_not_explained_until_they_settle():
     for _ in range(20):
         grid.insert((0, 0, 0), ranges)
     assert grid.explained(points[hit], settle=20).all()
-
-
-def test_a_map_laid_out_for_the_way_holds_what_one_that_grows_holds(jackal):
-    scanner = Scanner(jackal.lidar, np.array([[3.0, 1.0, 0.3], [9.0, -1.0, 0.2]]))
-    grown, ready = OccupancyMap(jackal.lidar), OccupancyMap(jackal.lidar, goal=(9.0, 0.0))
-    for x in np.arange(0.0, 8.0, 0.25).tolist():
-        for grid in (grown, ready):
-            grid.insert((x, 0.0, 0.0), scanner.scan((x, 0.0, 0.0)))
-    assert grown.layouts > ready.layouts == 1
-    order, other = (np.lexsort(grid.discs().T) for grid in (grown, ready))
-    np.testing.assert_allclose(grown.discs()[order], ready.discs()[other], atol=1e-6)
-    assert np.count_nonzero(grown.seen_free) == np.count_nonzero(ready.seen_free)
 
 
 def test_between_whole_scans_only_hits_are_entered(jackal):

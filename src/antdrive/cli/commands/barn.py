@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from antdrive.base.errors import InputError
 from antdrive.base.version import require_physics
 from antdrive.cli import options
-from antdrive.cli.campaign_options import OPTIONS
 from antdrive.cli.console import bar, campaign_bar, print_error, show
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults
@@ -58,6 +57,7 @@ def barn(
     from antdrive.robots import load_robot
     from antdrive.runs import barn_challenge as challenge
     from antdrive.runs.campaigns.campaign import make_campaign
+    from antdrive.runs.campaigns.notation import OPTIONS
     from antdrive.runs.campaigns.sweeping import sweep
 
     kind = given["map"]

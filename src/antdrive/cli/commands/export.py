@@ -9,7 +9,7 @@ from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import flag, option
-from antdrive.cli.parse import log_at, pair
+from antdrive.cli.parse import xacro
 
 
 def export(
@@ -33,7 +33,7 @@ def export(
     mcap and rosbag2 hold ROS 2 messages. They need antdrive[ros], but no ROS installation.
     """
     from antdrive.robots import RobotSpec
-    from antdrive.robots.importing.model import checked_packages
+    from antdrive.sim.log.rollout import log_at
     from antdrive.views.export.exporting import EXPORTS
     from antdrive.views.export.exporting import export as write
     from antdrive.views.export.robot_frames import RobotFrames, frames_of_spec, frames_of_urdf
@@ -52,8 +52,7 @@ def export(
             path=urdf,
             left=left,
             right=right,
-            arguments=dict(pair(word, "--arg") for word in arguments or ()),
-            packages=checked_packages(dict(pair(word, "--package") for word in packages or ())),
+            **xacro(arguments, packages),
         )
     files = write(log_at(rollout), to, out, replace=force, scans=scans, frames=frames)
     written = {("layout" if file.name.endswith(".foxglove.json") else to): str(file) for file in files}

@@ -1,20 +1,16 @@
 """`antdrive find-margin`."""
 
 import dataclasses
-from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
-from antdrive.base.tables import table
 from antdrive.cli import options
 from antdrive.cli.console import planning, show
 from antdrive.cli.options import argument, option
-from antdrive.cli.scenario_options import Ends, Setup, random_world
+from antdrive.cli.scenario_options import Ends, Setup
 
 if TYPE_CHECKING:
-    from antdrive.runs.margins.choice import MarginResult
     from antdrive.sim.pipeline import Run
-    from antdrive.sim.scenario import Scenario
     from antdrive.sim.written import Written
 
 ASTAR = Setup(planner="astar")
@@ -40,42 +36,32 @@ def find_margin(
     To predict a margin for any world instead, use `--margin auto` of other commands. Exit code 0: a margin of at most
     0.2 m is safe.
     """
+    from antdrive.runs.margins.choice import MarginSearch
     from antdrive.runs.margins.choice import find_margin as search
     from antdrive.sim.pipeline import run as drive
+    from antdrive.worlds.generators.generate import generated
 
     first = given.pop("seed")
     base = setup.scenario(_chosen(world, kind, ends), given)
     if max_speed is not None:
         slowed = dataclasses.replace(base.robot, max_speed=min(max_speed, base.robot.max_speed))
         base = dataclasses.replace(base, robot=slowed)
-    tasks = {
-        seed: base.task
-        if kind is None
-        else random_world(f"--generate {kind}: unknown kind", kind, seed, {}, f"{kind}-{seed}")
-        for seed in range(first, first + seeds)
-    }
+    tasks = {seed: base.task if kind is None else generated(kind, seed, ()) for seed in range(first, first + seeds)}
 
     def drive_with(margin: float, seed: int) -> "Run":
         return drive(dataclasses.replace(base, task=tasks[seed], margin=margin, seed=seed))
 
     with planning("searching for the smallest safe margin"):
-        trials = list(search(drive_with, list(tasks), reserve=reserve))
-    smallest = min((trial.margin for trial in trials if trial.safe), default=None)
+        found = MarginSearch(base, list(search(drive_with, list(tasks), reserve=reserve)))
     facts = {
-        "margin_m": smallest,
-        "default_m": base.usual_margin,
+        **found.as_dict(),
         "reserve_m": reserve,
         "world": world or kind,
         "planner": setup.planner,
         "seeds": [first, first + seeds - 1],
-        "robot": base.robot.name,
-        "max_speed": base.robot.max_speed,
-        "noise": base.noise,
-        "smoothing": base.smoothing,
-        "trials": [dataclasses.asdict(trial) for trial in trials],
     }
-    show(json, facts, _lines(base, trials, smallest))
-    return smallest is not None
+    show(json, facts, found.lines())
+    return found.smallest is not None
 
 
 def _chosen(world: str | None, kind: str | None, ends: Ends) -> "Written":
@@ -87,15 +73,3 @@ def _chosen(world: str | None, kind: str | None, ends: Ends) -> "Written":
     if ends != Ends():
         raise InputError("--task, --start, --goal: need a WORLD; random worlds have their own starts and goals")
     return ends.of("empty")
-
-
-def _lines(base: "Scenario", trials: "Sequence[MarginResult]", smallest: float | None) -> Iterator[str]:
-    from antdrive.runs.margins.choice import MARGIN_HEADS
-
-    yield from table(MARGIN_HEADS, (trial.cells for trial in sorted(trials, key=lambda trial: trial.margin)))
-    yield f"default for noise {base.noise:g}, smoothing {base.smoothing}: {base.usual_margin:.3f} m"
-    result = "none up to 0.2 m" if smallest is None else f"{smallest:.3f} m"
-    if trial := next((trial for trial in trials if trial.margin == smallest), None):
-        closed = f"; {trial.impassable} more worlds have no path with this margin" if trial.impassable else ""
-        result += f", from {trial.drives} drive{'' if trial.drives == 1 else 's'}{closed}"
-    yield f"smallest safe margin for {base.robot.name} at up to {base.robot.max_speed:g} m/s: {result}"

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 from antdrive.base.tables import table
 from antdrive.cli import options
 from antdrive.cli.console import show
-from antdrive.cli.parse import log_at
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
@@ -25,7 +24,7 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
     """
     from antdrive.base.plane import format_point
     from antdrive.sim.log.margin import budget, has_default
-    from antdrive.sim.log.rollout import Rollout
+    from antdrive.sim.log.rollout import Rollout, log_at
 
     log = Rollout.load(log_at(rollout))
     spent, prediction = budget(log), _prediction(log)

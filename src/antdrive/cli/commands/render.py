@@ -8,7 +8,6 @@ from antdrive.cli import options
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives
-from antdrive.cli.parse import log_at
 from antdrive.cli.parse import size as parse_size
 
 
@@ -28,14 +27,18 @@ def render(
     speed: options.Speed = 1.0,
     at: Annotated[float | None, option("SECONDS", "Write the frame at this time [s] (.png or .webp).", min=0.0)] = None,
     prelude: options.Prelude = 0.0,
+    planner: options.LogPlanner = None,
     json: options.Json = False,
 ) -> None:
     """Render films of logged drives from any camera.
 
     Films replay the log, without physics.
     """
-    from antdrive.sim.log.rollout import Rollout
+    from antdrive.planners import load_planner
+    from antdrive.sim.log.rollout import Rollout, log_at
 
+    if planner is not None:
+        load_planner(planner)  # known by its class, as the log names it
     logs = [Rollout.load(log_at(path)) for path in rollouts]
     shape: dict[str, Any] = {} if size is None else {"size": parse_size(size)}
     one_frame = at is not None or out.suffix.lower() == ".png"

@@ -5,13 +5,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from antdrive.base.checks import pair
 from antdrive.base.errors import InputError
 from antdrive.base.files import summary_of
 from antdrive.cli import options
 from antdrive.cli.console import file_lines, show
 from antdrive.cli.listings import Row, robot_lines
 from antdrive.cli.options import argument, flag, option
-from antdrive.cli.parse import import_target, numbers, pair
+from antdrive.cli.parse import import_target, numbers, xacro
 
 if TYPE_CHECKING:
     from antdrive.robots import RobotSpec
@@ -96,7 +97,6 @@ def import_robot(
     """
     from antdrive.base.atomic import write_text
     from antdrive.robots import robot_to_dict
-    from antdrive.robots.importing.model import checked_packages
     from antdrive.robots.importing.urdf_import import import_urdf
 
     values = {"wheel_radius": wheel_radius} if wheel_radius is not None else {}
@@ -115,8 +115,7 @@ def import_robot(
         meshes=meshes,
         without_meshes=without_meshes,
         given=values,
-        arguments=dict(pair(word, "--arg") for word in arguments or ()),
-        packages=checked_packages(dict(pair(word, "--package") for word in packages or ())),
+        **xacro(arguments, packages),
     )
     files = {"robot": str(target)}
     if figure is not None:

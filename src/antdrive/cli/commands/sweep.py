@@ -1,15 +1,11 @@
 """`antdrive sweep`."""
 
-import shlex
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
-from antdrive.base.tables import table
 from antdrive.cli import options
-from antdrive.cli.campaign_options import campaign_from
 from antdrive.cli.console import campaign_bar, print_error, show
 from antdrive.cli.exits import SUCCEEDED
 from antdrive.cli.options import argument, flag, option
@@ -17,8 +13,6 @@ from antdrive.cli.output import print_faults
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
-    from antdrive.runs.campaigns.expanding import Expansion
-    from antdrive.runs.campaigns.results import SweepResults
     from antdrive.runs.campaigns.running import Keep
 
 
@@ -36,7 +30,16 @@ def sweep(
         list[str] | None,
         option(
             "NAME",
-            "Planner or FILE.py:CLASS; options follow a colon: as:ants=10,50 or as:ants=10..50..20. Repeatable.",
+            "Planner name or FILE.py:CLASS. Repeatable.",
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        option(
+            "GROUP.KEY=VALUES",
+            "Options of a planner (as.ants=10,50 or as.ants=10..50..20) or of all (planner.ants=50). Repeatable.",
+            "--set",
+            "-s",
         ),
     ] = None,
     robot: Annotated[list[str] | None, option("NAME", "Robot name or file. Repeatable.")] = None,
@@ -85,6 +88,7 @@ def sweep(
     an error of a planner or of antdrive.
     """
     from antdrive.runs.campaigns.expanding import expand
+    from antdrive.runs.campaigns.notation import campaign_from
     from antdrive.runs.campaigns.sweeping import differences, missing_runs
     from antdrive.runs.campaigns.sweeping import sweep as make_runs
 
@@ -92,8 +96,8 @@ def sweep(
         raise InputError("--out: missing; name the output folder")
     _check(keep, dask, jobs, report, dry_run)
     requested = campaign_from(
-        campaign, given, worlds=world, generate=generate, planners=planner, robots=robot, seeds=seeds, tasks=tasks,
-        run_limit=run_limit,
+        campaign, given, worlds=world, generate=generate, planners=planner, options=settings, robots=robot, seeds=seeds,
+        tasks=tasks, run_limit=run_limit,
     )  # fmt: skip
     expansion = expand(requested)
     rest: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}
@@ -104,7 +108,7 @@ def sweep(
         size = len(expansion.jobs)
         missing = size if out is None else len(missing_runs(expansion.jobs, out, **rest).jobs)
         counts = {"duplicates": expansion.duplicates, "counts": expansion.counts}
-        show(json, {"runs": size, "missing": missing, **counts}, _size_lines(expansion, missing))
+        show(json, {"runs": size, "missing": missing, **counts}, expansion.lines(missing))
         return SUCCEEDED
     with campaign_bar("driving") as progress:
         rest |= {"jobs": jobs, "dask": dask, "keep": cast("Keep | None", keep)}
@@ -114,17 +118,7 @@ def sweep(
         from antdrive.views.pages.report import write_report
 
         files = [str(path) for path in write_report(out, report).files]
-    facts = {
-        "folder": str(results.folder),
-        "table": str(results.path),
-        "runs": results.size,
-        "made": results.made,
-        "succeeded": results.succeeded,
-        "outcomes": results.outcomes,
-        "faults": results.faults,
-        **({"report": files[0]} if files else {}),
-    }
-    show(json, facts, _lines(results, files))
+    show(json, results.as_dict() | ({"report": files[0]} if files else {}), results.lines(files))
     return print_faults(results.faults)
 
 
@@ -142,34 +136,3 @@ def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | 
         raise InputError(f"--keep {keep}: unknown; choose from {', '.join(get_args(Kinds))}")
     if dask is not None and jobs is not None:
         raise InputError("--jobs: has no effect with --dask; use --dask local:N for N processes")
-
-
-def _size_lines(expansion: "Expansion", missing: int) -> Iterator[str]:
-    """Yield the size of a campaign as lines."""
-
-    def counted(name: str, count: int) -> str:
-        plural = count != 1 or " " in name or name == "settings"
-        return f"{count} {name if plural else name.removesuffix('s')}"
-
-    smoothings = dict.fromkeys(str(job.case.resolved.columns["smoothing"]) for job in expansion.jobs)
-    values = {"smoothing": f"smoothing {', '.join(smoothings)}"}
-    yield " x ".join(values.get(name) or counted(name, count) for name, count in expansion.counts.items())
-    omitted = f"; {expansion.duplicates} duplicate combinations omitted" if expansion.duplicates else ""
-    yield f"{len(expansion.jobs)} runs, {missing} missing{omitted}"
-
-
-def _lines(results: "SweepResults", reports: Sequence[str]) -> Iterator[str]:
-    """Yield the outcomes of a campaign, metrics of successful runs, and paths as lines."""
-    from antdrive.runs.campaigns.results import MEDIANS
-
-    yield f"{results.size} runs ({results.made} new): {results.succeeded} succeeded, certified"
-    yield from table(("outcome", "runs"), ((name, str(count)) for name, count in results.outcomes.items()))
-    if medians := list(results.medians()):
-        yield ""
-        yield "medians of successful runs (minimum to maximum)"
-        yield from table(("planner", "runs", *MEDIANS.values()), medians)
-    yield f"  table    {results.path}"
-    yield from (f"  report   {file}" for file in reports)
-    if not reports:
-        report = shlex.join(["antdrive", "report", str(results.folder), "-o", str(results.folder / "report.html")])
-        yield f"  charts, intervals and all runs: {report}"

@@ -10,7 +10,6 @@ from antdrive.cli import options
 from antdrive.cli.console import marked, print_error, print_json, print_line
 from antdrive.cli.exits import INVALID_INPUT
 from antdrive.cli.options import argument, flag, option
-from antdrive.cli.parse import log_at
 
 
 def verify(
@@ -29,6 +28,7 @@ def verify(
     Exit code 2: a log cannot be read; the others are still certified.
     """
     from antdrive.robots.robot_file import load_robot
+    from antdrive.sim.log.rollout import log_at
     from antdrive.sim.verifying import verify_log
     from antdrive.worlds.files.world_file import load_task
 

@@ -1,20 +1,21 @@
 """`antdrive worlds`: list, show, generate, import and export."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from antdrive.base.checks import pair
 from antdrive.base.errors import InputError
-from antdrive.base.files import file_name, summary_of
+from antdrive.base.files import summary_of
 from antdrive.cli import options
 from antdrive.cli.console import bar, file_lines, show, stage
 from antdrive.cli.listings import Row, world_lines
 from antdrive.cli.options import argument, flag, option
-from antdrive.cli.parse import import_target, numbers, pair
-from antdrive.cli.scenario_options import Ends, random_world
+from antdrive.cli.parse import import_target, numbers, pose
+from antdrive.cli.scenario_options import Ends
 
 if TYPE_CHECKING:
-    from antdrive.worlds import Task
+    pass
 
 MANY = 5000  # cylinders; planning takes seconds beyond this
 
@@ -82,10 +83,10 @@ def generate_world(
     **given: Any,
 ) -> None:
     """Generate a random world."""
-    from antdrive.worlds import save_task
+    from antdrive.worlds import generate, save_task
 
     values = dict(pair(text) for text in settings or ())
-    save_task(random_world(f"generate: unknown kind {kind!r}", kind, given["seed"], values, out.stem), out)
+    save_task(generate(kind, given["seed"], values, name=out.stem, note=f"seed {given['seed']}"), out)
     show(False, None, file_lines({"world": out}))
 
 
@@ -98,7 +99,7 @@ def import_world(
         Path | None, option("FILE", "World file to write (DynaBARN: folder).  [default: FILE's name]")
     ] = None,
     barn: Annotated[bool, flag("SDF: start and goal of the BARN Challenge.", "--barn")] = False,
-    start: Annotated[str | None, option("X,Y,YAW", "Start pose [m, m, rad]; maps contain none.")] = None,
+    start: Annotated[str | None, option("X,Y,YAW", "Start pose [m, m, rad or 90deg]; maps contain none.")] = None,
     goal: Annotated[str | None, option("X,Y", "Goal [m]; maps contain none.")] = None,
     bounds: Annotated[
         str | None, option("BOUNDS", "SDF: walls at XMIN,YMIN,XMAX,YMAX [m].  [default: 1 m around the obstacles]")
@@ -141,17 +142,17 @@ def import_world(
     `source` of the world file states how far they reach beyond, and what was ignored.
     """
     from antdrive.base.plane import format_point
-    from antdrive.worlds import import_file, save_task
+    from antdrive.worlds import import_file
     from antdrive.worlds.formats.cellmap import conversion_progress
-    from antdrive.worlds.formats.importing import IMPORTS, import_format
-    from antdrive.worlds.formats.map_server import OF_SHADE, kept_tasks
+    from antdrive.worlds.formats.importing import IMPORTS, import_format, save_imported
+    from antdrive.worlds.formats.map_server import OF_SHADE
 
     skipped: list[str] = []
     file_format = import_format(path, barn=barn)
     with bar("converting") as progress, conversion_progress(progress):
         tasks = import_file(
             path,
-            start=numbers("--start", start, 3, "X,Y,YAW"),
+            start=pose("--start", start),
             goal=numbers("--goal", goal, 2, "X,Y"),
             bounds=numbers("--bounds", bounds, 4),
             barn=barn,
@@ -167,10 +168,8 @@ def import_world(
         )
     is_set = file_format is IMPORTS["dynabarn"]
     usual = Path(f"{path.stem}.yaml")
-    files = _targets(path, out or Path(path.stem), tasks) if is_set else [import_target(path, out, usual, "world")]
-    for task, file in zip(tasks, files, strict=True):
-        # A map written by antdrive holds the other tasks in its file.
-        save_task(task, file, kept_tasks(path, task) if file_format is IMPORTS["map_server"] else {})
+    target = (out or Path(path.stem)) if is_set else import_target(path, out, usual, "world")
+    files = save_imported(path, tasks, target)
     imported = [{**task.as_dict(), "files": {"world": str(file)}} for task, file in zip(tasks, files, strict=True)]
     lines = []
     if len(tasks) == 1:
@@ -190,15 +189,6 @@ def import_world(
         lines += [f"  skipped  {part}" for part in skipped]
     lines += [line for file in files for line in file_lines({"world": file})]
     show(json, {"worlds": imported} if is_set else imported[0], lines)
-
-
-def _targets(path: Path, folder: Path, tasks: "Sequence[Task]") -> list[Path]:
-    """Return one file per world of a set."""
-    files = [folder / f"{file_name(task.world.name)}.yaml" for task in tasks]
-    twice = next((file for i, file in enumerate(files) if file in files[:i]), None)
-    if twice is not None:
-        raise InputError(f"{path}: two worlds map to {twice}; give them different names")
-    return files
 
 
 def export_world(

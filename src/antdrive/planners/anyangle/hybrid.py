@@ -22,7 +22,7 @@ from antdrive.planners.anyangle.ga_han import Incumbent, seeded
 from antdrive.planners.anyangle.lines import RouteEnds, route_ends, terrain
 from antdrive.planners.colonies.catalog import colonies
 from antdrive.planners.colonies.colony import Colony
-from antdrive.planners.iterative import WARMUP_ITERATIONS, Iteration, IterativePlanner
+from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Cells, Query
 
 ROUNDS = 20  # tightening passes over the via points of a new path
@@ -83,11 +83,6 @@ class Hybrid(IterativePlanner):
         require("mutation", self.mutation, at_least=0, at_most=1)
         require("degrees_per_point", self.degrees_per_point, above=0, at_most=180)
         require("max_shift", self.max_shift, above=0)
-
-    def for_warmup(self) -> Hybrid:
-        """Return this planner with one iteration of ants and two generations."""
-        few = dataclasses.replace(self, ant_runs=1, ant_iterations=1, time_budget=None)
-        return dataclasses.replace(few, iterations=min(self.iterations, 1 + WARMUP_ITERATIONS))
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
         """Run the ants, pull their best path straight, then breed lines from it without end."""

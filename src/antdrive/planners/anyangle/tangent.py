@@ -165,7 +165,8 @@ class Tangent(GridPlanner):
     def __post_init__(self) -> None:
         require("bulge", self.bulge, above=0)
 
-    def _answer(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def untimed(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Find a path, without its planning time and options."""
         return self.search(query, rng)  # the cells of the ends need not be free
 
     def search(self, query: Query, rng: np.random.Generator) -> PlanResult:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import abc
 import dataclasses
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
@@ -17,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
+from antdrive.base.kernel_cache import clock, compiled
 from antdrive.planners.graph.search import UNREACHABLE
 from antdrive.planners.plan import (
     Capabilities,
@@ -164,17 +164,18 @@ class CachedReplanner(abc.ABC):
         count = int(self._common.adopt(self._moves, grid.moves, relabelled, self._edited))
         return self._record(count)
 
+    @compiled()
     def result(self) -> PlanResult:
         """Return the path from the robot's cell; `work` and `wall_s` are those of this call."""
-        started = time.perf_counter()
+        spent = clock()
         blocked = self._query.blocked_end
         if blocked:
-            return PlanResult(status=PlanStatus.NO_PATH, reason=blocked, wall_s=time.perf_counter() - started)
+            return PlanResult(status=PlanStatus.NO_PATH, reason=blocked, wall_s=spent())
         answer = self._remaining_path()
         if answer is None:
             answer = self._last = self._replan(self._query, self._take_edits())
             self._last_start = self._query.start_node
-        return dataclasses.replace(answer, wall_s=time.perf_counter() - started)
+        return dataclasses.replace(answer, wall_s=spent())
 
     @abc.abstractmethod
     def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:

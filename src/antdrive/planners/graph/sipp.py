@@ -6,7 +6,6 @@ M. Phillips and M. Likhachev, *SIPP: Safe interval path planning for dynamic env
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -16,6 +15,7 @@ import numpy.typing as npt
 
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError, require
+from antdrive.base.kernel_cache import clock
 from antdrive.base.plane import segment_lengths
 from antdrive.planners.entrances import clear_lead, outline_at, turn_at
 from antdrive.planners.graph.search import UNREACHABLE, reachable
@@ -112,14 +112,14 @@ def plan_in_time(
     require("speed", speed, above=0, below=math.inf)
     require("yaw_rate", yaw_rate, above=0, below=math.inf)
     require("horizon", horizon, above=0)
-    started = time.perf_counter()
+    spent = clock()
     reason = query.blocked_end or ("" if reachable(query) else UNREACHABLE)
     plan = (
         TimedPlan(status=PlanStatus.NO_PATH, reason=reason)
         if reason
         else _earliest(query, movers, speed, yaw_rate, start_time=start_time, horizon=horizon, stay=stay)
     )
-    return replace(plan, work_unit=UNIT, wall_s=time.perf_counter() - started)
+    return replace(plan, work_unit=UNIT, wall_s=spent())
 
 
 def _earliest(

@@ -22,7 +22,7 @@ from antdrive.sim.effects import idle_notes
 from antdrive.sim.forms import scenario_fields
 from antdrive.sim.log.record import canonical_hash
 from antdrive.sim.scenario import Scenario, key_of
-from antdrive.sim.written import Written, unchosen
+from antdrive.sim.written import Written, placed, unchosen
 from antdrive.worlds import Task
 from antdrive.worlds.formats.map_server import OF_SHADE
 
@@ -54,6 +54,23 @@ class Expansion:
                 alike[key] = case.scenario(min(seeds), unchosen)
             scenarios.append(alike[key])
         return idle_notes(scenarios, {"seed"} if len(seeds) > 1 else ())
+
+    def lines(self, missing: int) -> Iterator[str]:
+        """Yield the size of the campaign as lines.
+
+        Args:
+            missing: number of runs that are not done
+        """
+        smoothings = dict.fromkeys(str(job.case.resolved.columns["smoothing"]) for job in self.jobs)
+        said = {"smoothing": f"smoothing {', '.join(smoothings)}"}
+        yield " x ".join(said.get(name) or _counted(name, count) for name, count in self.counts.items())
+        omitted = f"; {self.duplicates} duplicate combinations omitted" if self.duplicates else ""
+        yield f"{len(self.jobs)} runs, {missing} missing{omitted}"
+
+
+def _counted(name: str, count: int) -> str:
+    plural = count != 1 or " " in name or name == "settings"
+    return f"{count} {name if plural else name.removesuffix('s')}"
 
 
 def expand(campaign: Campaign) -> Expansion:
@@ -121,10 +138,8 @@ def _robots(campaign: Campaign) -> list[NamedRobot]:
     """Return the robots of a campaign, each once."""
     known, robots = list_robots(), dict[str, NamedRobot]()
     for i, name in enumerate(campaign.entry.robots):
-        try:
+        with placed(campaign.at("robots", i, skip=1)):
             path = resolve("robot", name, known, campaign.folder)
-        except FieldError as error:
-            raise campaign.error(("robots", i), error.problem) from None
         robot = load_robot(path)
         content = canonical_hash(robot)
         word = name if name in known else f"{ROBOTS}/{content[:8]}/{path.name}"
@@ -146,10 +161,8 @@ def _settings(campaign: Campaign) -> list[tuple[dict[str, Any], Location]]:
     combinations = []
     for *values, (settings, place) in itertools.product(*map(campaign.values, AXES), listed):
         given = {**settings, **dict(zip(keys, values, strict=True))}
-        try:
+        with placed(campaign.at(*place)):
             scenario_fields(given)
-        except FieldError as error:
-            raise campaign.error((*place, *error.key.split(".")), error.problem) from None
         combinations.append((given, place))
     return combinations
 

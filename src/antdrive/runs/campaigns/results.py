@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ import numpy as np
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import open_regular, relative
 from antdrive.base.optional import parquet_library
+from antdrive.base.tables import table
 from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, PLANNER_FAULT
 from antdrive.runs.campaigns.store import GRID_FILE, TABLE, joined, read_manifest, read_table
 from antdrive.runs.statistics.run_table import FOLDER, RunTable, column_named, matching, merged
@@ -82,6 +84,36 @@ class SweepResults:
                 values = np.array([row[name] for row in own], dtype=float) * (1000.0 if unit.endswith(" ms") else 1.0)
                 cells.append(f"{np.median(values):.3g} ({values.min():.3g} to {values.max():.3g})")
             yield planner, str(len(own)), *cells
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return places, numbers of runs, outcomes and faults as plain values."""
+        return {
+            "folder": str(self.folder),
+            "table": str(self.path),
+            "runs": self.size,
+            "made": self.made,
+            "succeeded": self.succeeded,
+            "outcomes": self.outcomes,
+            "faults": self.faults,
+        }
+
+    def lines(self, reports: Sequence[str] = ()) -> Iterator[str]:
+        """Yield outcomes, metrics of successful runs, and places as lines.
+
+        Args:
+            reports: files of reports that were written
+        """
+        yield f"{self.size} runs ({self.made} new): {self.succeeded} succeeded, certified"
+        yield from table(("outcome", "runs"), ((name, str(count)) for name, count in self.outcomes.items()))
+        if medians := list(self.medians()):
+            yield ""
+            yield "medians of successful runs (minimum to maximum)"
+            yield from table(("planner", "runs", *MEDIANS.values()), medians)
+        yield f"  table    {self.path}"
+        yield from (f"  report   {file}" for file in reports)
+        if not reports:
+            report = shlex.join(["antdrive", "report", str(self.folder), "-o", str(self.folder / "report.html")])
+            yield f"  charts, intervals and all runs: {report}"
 
     def __repr__(self) -> str:
         return (

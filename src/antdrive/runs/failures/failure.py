@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from antdrive.base.checks import suggest
-from antdrive.base.errors import FieldError, input_error
+from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.planners import PlannerError
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import CYLINDER, UNSEEN, WALL, Bound
 from antdrive.runs.suites.evaluation import RAISED, evaluate, limits, unmet_demands
 from antdrive.runs.suites.nearest import NOTHING, cause_of_contact, first_contact_kind
-from antdrive.runs.suites.suite import SuiteCase
+from antdrive.runs.suites.scenarios import scenario_of, select
+from antdrive.runs.suites.suite import SUFFIX, SuiteCase
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.rollout import Rollout, log_at, read_record
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.scenario import Scenario
+from antdrive.sim.written import rebuilt
 
 _BOUND = re.compile(r"\s*(\w+)\s*(<=|>=|<|>|==)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 
@@ -116,6 +119,41 @@ def bound_broken_in(case: SuiteCase, done: Run) -> Bound | None:
     if broken is None and done.succeeded:
         raise input_error(case.address, f"{faults[0]}; another world cannot repeat that, so shrinking is impossible")
     return broken
+
+
+def failing(
+    words: str, planner: str | None, choose: Callable[[Scenario], Scenario]
+) -> tuple[Scenario, SuiteCase | None]:
+    """Return the scenario of a log, or of a test of a suite with the test.
+
+    Args:
+        words: a log, a run's folder, or SUITE::SCENARIO
+        planner: class of the log's planner as FILE.py:CLASS, if it is not registered
+        choose: chooses the margin `auto`
+
+    Raises:
+        InputError: there is no such log or test, several tests match, or the scenario cannot be built.
+    """
+    if "::" in words:
+        cases = select([words])
+        if len(cases) > 1:
+            raise InputError(f"{words}: name one of {', '.join(case.address for case in cases[:5])}")
+        return scenario_of(cases[0], choose), cases[0]
+    if words.endswith(SUFFIX):
+        raise InputError(f"{words}: is a suite; name one of its tests: {words}::SCENARIO")
+    words = str(log_at(Path(words)))
+    try:
+        return rebuilt(read_record(words), planner), None
+    except InputError as error:
+        raise error if str(error).startswith(words) else input_error(words, str(error)) from None
+
+
+def broken_bound(case: SuiteCase | None, scenario: Scenario) -> Bound | None:
+    """Return the bound of a test or its baseline that the drive breaks although it ends as expected; drives if there is any."""
+    if case is None or not (case.demands.bounds or case.entry.baseline):
+        return None
+    done = Attempt.of(scenario).run
+    return None if done is None else bound_broken_in(case, done)
 
 
 def _first_broken(bounds: Iterable[Bound], rollout: Rollout) -> Bound | None:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -256,6 +256,11 @@ class Hunt:
     def distinct(self) -> tuple[Finding, ...]:
         """The failures that differ from all earlier ones."""
         return tuple(finding for finding in self.findings if finding.is_new)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the numbers of runs and failures as plain values."""
+        counts = {"failures": len(self.findings), "distinct": len(self.distinct)}
+        return {"runs": self.runs, "driven": self.driven, "interrupted": self.interrupted, **counts}
 
 
 def find_failures(

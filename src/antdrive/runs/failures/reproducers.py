@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from antdrive.base.tables import table
 from antdrive.runs.failures.failure import Attempt
 from antdrive.runs.failures.handover import Handover, renamed, run_elsewhere, write_suite
 from antdrive.runs.failures.hunt import Finding, Hunt
@@ -27,6 +29,13 @@ class Reproducer:
     small: Attempt  # run of the minimal scenario
     # whether the original and the minimal scenario, the latter read from its files, repeat bitwise in another process
     repeats: bool
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The row of the table of failures."""
+        before, after = (len(s.task.world.obstacles) for s in (self.finding.scenario, self.small.scenario))
+        repeats, failure = "yes" if self.repeats else "NO", self.finding.failure.sentence
+        return self.name, str(self.finding.number), repeats, f"{before} -> {after}", failure
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, for JSON."""
@@ -57,6 +66,9 @@ def write_reproducers(
         seconds: time limit for shrinking each failure [s]
         progress: called with the completed fraction
     """
+    if not hunt.findings:
+        (folder / SUITE).unlink(missing_ok=True)
+        return []
     small: list[Attempt] = []
     for k, finding in enumerate(hunt.distinct):
         name, scenario = _name(k), finding.scenario
@@ -80,6 +92,25 @@ def write_reproducers(
         same = pair == (finding.fingerprint, done.fingerprint) and done.failure() == finding.failure
         made.append(Reproducer(_name(k), finding, done, same))
     return made
+
+
+def failure_lines(hunt: Hunt, reported: Sequence[Reproducer], folder: Path, *, filmed: bool) -> Iterator[str]:
+    """Yield the result of a search as lines: its failures, and the commands that repeat and report them.
+
+    Args:
+        hunt: the search
+        reported: its reproducers
+        folder: of their suite
+        filmed: whether they are filmed
+    """
+    ended = "interrupted after" if hunt.interrupted else "after"
+    runs = f"{hunt.runs} runs (the robot drove in {hunt.driven})"
+    yield f"{ended} {runs}: {len(hunt.findings)} failures, {len(hunt.distinct)} distinct"
+    if reported:
+        yield from table(("name", "run", "repeats", "obstacles", "failure"), (one.cells for one in reported))
+        yield f"suite of the failures, {'with worlds, logs and films' if filmed else 'with worlds and logs'}: {folder}"
+        yield f"repeat: {shlex.join(['antdrive', 'check', str(folder / SUITE)])}"
+        yield f"report: {shlex.join(['antdrive', 'report', str(folder), '-o', str(folder / 'report.html')])}"
 
 
 def _name(index: int) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from antdrive.base.errors import InputError
 from antdrive.runs.failures.candidates import (
@@ -62,6 +64,29 @@ class Shrunk:
             if old != new or name == "obstacles":
                 parts.append(f"{name} {old:g} -> {new:g}")
         return ", ".join(parts)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return failure, reductions and numbers of runs as plain values."""
+        return {
+            "failure": dataclasses.asdict(self.failure),
+            "summary": self.summary,
+            "complete": self.complete,
+            "trials": self.runs,
+            "recalled": self.recalled,
+        }
+
+    def lines(self, repeats: bool) -> Iterator[str]:
+        """Yield the failure and its reductions as lines.
+
+        Args:
+            repeats: whether the minimal scenario fails in the same way in another process
+        """
+        yield f"{self.original.task.world.name}: {self.failure.sentence}"
+        yield f"{'smaller' if self.smaller else 'no smaller'} after {self.runs} runs: {self.summary}"
+        if not self.complete:
+            yield "time limit reached: repeat the command to continue, or raise --seconds"
+        if not repeats:
+            yield "the reproducer did not fail in the same way in another process: the scenario is not deterministic"
 
 
 def shrink(

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -22,6 +23,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import read_bytes
 from antdrive.base.kernel_cache import cache_folder
 from antdrive.base.records import STRICT
+from antdrive.base.tables import table
 from antdrive.base.version import require_physics
 from antdrive.robots.default_margin import RESERVE
 from antdrive.runs.margins.loss import Loss, calibration_key, loss_on_course
@@ -261,6 +263,42 @@ class MarginResult:
         left = f"{self.left:.4f}" if self.drives else "-"
         failed = "" if self.failed is None else f"seed {self.failed}"
         return f"{self.margin:.3f}", str(self.drives), str(self.impassable), left, failed
+
+
+@dataclass(frozen=True, eq=False)
+class MarginSearch:
+    """The margins tried in a search, in their order, and the scenario of its drives."""
+
+    base: Scenario
+    trials: Sequence[MarginResult]
+
+    @property
+    def smallest(self) -> float | None:
+        """The smallest safe margin [m]; None if no margin is."""
+        return min((trial.margin for trial in self.trials if trial.safe), default=None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the margins and the settings of the drives as plain values."""
+        return {
+            "margin_m": self.smallest,
+            "default_m": self.base.usual_margin,
+            "robot": self.base.robot.name,
+            "max_speed": self.base.robot.max_speed,
+            "noise": self.base.noise,
+            "smoothing": self.base.smoothing,
+            "trials": [dataclasses.asdict(trial) for trial in self.trials],
+        }
+
+    def lines(self) -> Iterator[str]:
+        """Yield a table of the margins, and the smallest safe one, as lines."""
+        base, smallest = self.base, self.smallest
+        yield from table(MARGIN_HEADS, (trial.cells for trial in sorted(self.trials, key=lambda trial: trial.margin)))
+        yield f"default for noise {base.noise:g}, smoothing {base.smoothing}: {base.usual_margin:.3f} m"
+        result = "none up to 0.2 m" if smallest is None else f"{smallest:.3f} m"
+        if trial := next((trial for trial in self.trials if trial.margin == smallest), None):
+            closed = f"; {trial.impassable} more worlds have no path with this margin" if trial.impassable else ""
+            result += f", from {trial.drives} drive{'' if trial.drives == 1 else 's'}{closed}"
+        yield f"smallest safe margin for {base.robot.name} at up to {base.robot.max_speed:g} m/s: {result}"
 
 
 def find_margin(

@@ -6,11 +6,13 @@ an arm, for instance that a colony learns at all.
 
 from __future__ import annotations
 
+import csv
 import enum
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -19,7 +21,6 @@ import numpy.typing as npt
 
 from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.paper_runs import PaperRun
-from antdrive.runs.papers.paragraphs import read_table
 from antdrive.runs.statistics.intervals import Interval, means_by_world, medians_by_world, resampled, wilson
 from antdrive.runs.statistics.significance import wilcoxon
 from antdrive.sim.log.record import finite_or_none
@@ -61,6 +62,15 @@ class Claim:
     def arms(self) -> frozenset[Arm]:
         """The experiments that the test needs."""
         return frozenset(arm for case in self.cases for arm in case)
+
+
+def read_table(folder: str, paper: str) -> Iterator[dict[str, str]]:
+    """Yield the rows of a paper's table in `folder`, by heading: `rows` of claims, or `paragraphs` that claim something.
+
+    A paragraph has its lines in the paper's plain text, its place and quote, the rows that test it, and why none does.
+    """
+    with (Path(__file__).parent / folder / f"{paper}.csv").open(newline="", encoding="utf-8") as file:
+        yield from csv.DictReader(file)
 
 
 def _claim(paper: str, row: dict[str, str]) -> Claim:

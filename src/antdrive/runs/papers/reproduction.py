@@ -74,7 +74,7 @@ def runs_key(experiment: Experiment, seeds: int) -> str:
     return json.dumps(facts, sort_keys=True)
 
 
-EVALUATING = ("claims", "paragraphs", "arms")  # modules on which no run depends
+EVALUATING = ("claims", "arms")  # modules on which no run depends
 
 
 @functools.cache

@@ -25,7 +25,6 @@ from antdrive.planners import is_built_in
 from antdrive.planners.user_code import module_hash
 from antdrive.runs.suites.nearest import ClosestApproach, nearest_of
 from antdrive.runs.suites.suite import shown_path
-from antdrive.sim.compose import compose
 from antdrive.sim.facts import facts_of
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
@@ -253,7 +252,7 @@ def configuration_hashes(run: Run) -> dict[str, str]:
         options = {field.name: getattr(planner, field.name) for field in dataclasses.fields(planner)}
         plan = dataclasses.replace(plan, options=options)
     fields = {
-        **configuration_of(s, compose(s), run.grid, plan),
+        **configuration_of(s, run.grid, plan),
         "time_limit": s.time_limit or s.task.time_limit or 1.0,
         "smoothing": s.smoothing,
     }

@@ -264,7 +264,7 @@ def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluatio
         if run.succeeded:
             gains.extend(outcome_changes)
         elif not _demanded(baseline.outcome, baseline.certified, demands) or _demanded(
-            run.outcome, _certified(run), demands
+            run.outcome, run.certified, demands
         ):
             # else it is among the faults
             faults.extend(outcome_changes)
@@ -273,7 +273,7 @@ def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluatio
             for name in compared(demands):
                 if math.isfinite(baseline.metric(name)):
                     _compare(name, run.rollout, baseline, demands, faults, gains)
-                elif math.isfinite(METRICS[name](run.rollout)):
+                elif math.isfinite(run.metric(name)):
                     missing.append(name)
             faults += _line_faults(run.rollout, baseline, demands)
             if missing:
@@ -281,27 +281,22 @@ def evaluate(run: Run, demands: Demands, baseline: Baseline | None) -> Evaluatio
     return Evaluation(tuple(faults), tuple(gains), tuple(notes))
 
 
-def _certified(run: Run) -> bool:
-    return run.certificate is not None and run.certificate.certified
-
-
 def unmet_demands(run: Run, demands: Demands) -> Iterator[str]:
     """Yield the demands that a run does not meet, regardless of the baseline, a sentence each."""
-    certified = _certified(run)
     if run.outcome is not demands.outcome:
         reason = f" ({run.reason})" if run.reason else ""
         yield f"outcome: {run.outcome.key}, expected {demands.outcome.key}{reason}"
-    elif demands.must_be_certified and not certified:
+    elif demands.must_be_certified and not run.certified:
         problems = run.certificate.problems if run.certificate else ("the robot did not drive",)
         yield f"certificate: not certified collision-free ({'; '.join(problems)})"
-    elif demands.certified is False and certified:
+    elif demands.certified is False and run.certified:
         yield "certificate: certified collision-free, expected not to be"
     if run.outcome is demands.outcome and run.rollout is not None:
         yield from _other_contact(run.rollout, demands)
     for bound in demands.bounds:
         if run.rollout is None:
             yield f"{bound.metric}: the robot did not drive, expected {bound.sign} {bound.value:g}"
-        elif not bound.holds(measured := METRICS[bound.metric](run.rollout)):
+        elif not bound.holds(measured := run.metric(bound.metric)):
             yield f"{bound.metric}: {measured:.6g}, expected {bound.sign} {bound.value:g}{_place(bound.metric, run.rollout)}"
 
 
@@ -317,14 +312,11 @@ def _outcome_changes(run: Run, baseline: Baseline) -> list[str]:
     """Return the differences of outcome and certificate from the baseline's, a sentence each."""
     if run.outcome is not baseline.outcome:
         return [f"outcome: {run.outcome.key}, in the baseline {baseline.outcome.key}"]
-    certified = _certified(run)
-    if certified == baseline.certified:
+    if run.certified == baseline.certified:
         return []
     words = "certified collision-free"
     return [
-        f"certificate: {words}, in the baseline not"
-        if certified
-        else f"certificate: not {words}, in the baseline it was"
+        f"certificate: {f'{words}, in the baseline not' if run.certified else f'not {words}, in the baseline it was'}"
     ]
 
 

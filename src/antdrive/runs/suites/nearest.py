@@ -56,12 +56,12 @@ def first_contact(rollout: Rollout) -> ClosestApproach | None:
     touches = touches_of(rollout)
     if not touches:
         return None
-    row, index = touches[0].step, touches[0].obstacle
+    row, kind = touches[0].step, first_contact_kind(rollout)
     world = dataclasses.replace(rollout.record.world, movers=())
-    discs, movers = len(world.obstacles), len(rollout.record.world.movers)
-    if discs <= index < discs + movers:
+    discs, index = len(world.obstacles), touches[0].obstacle
+    if kind == MOVER:
         return _encounter(rollout, row, _mover(rollout, index - discs, row))
-    column = index if index < discs else discs + _WALL_OF_CONTACT[index - discs - movers]
+    column = discs + _WALL_OF_CONTACT[index - discs - len(rollout.record.world.movers)] if kind == WALL else index
     return _encounter(rollout, row, obstacle_name(world, column, len(rollout.record.unseen)))
 
 

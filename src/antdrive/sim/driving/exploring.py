@@ -9,13 +9,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-import time
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from antdrive.base import Bounds, Floats, Pose
+from antdrive.base.kernel_cache import clock
 from antdrive.base.records import derived
 from antdrive.planners import PlanResult, PlanStatus, Query, smooth
 from antdrive.robots import TrackedPath, Twist, outline_of
@@ -336,12 +336,12 @@ class Exploration(RouteGuide):
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """Return a new path from a pose; None if there is none, or a scan turn comes first."""
-        now, started = tick / self._hz, time.perf_counter()
+        now, spent = tick / self._hz, clock()
         self._planned_at, self._tick = now, tick
         if trigger in (STALLED, HELD, BACKED, MADE_ROOM, SCANNED):
             recovers, way = self._recovered(now, pose, trigger)
             if way is not None:
-                self.note(now, trigger, time.perf_counter() - started, 0, way.length, way.route.xy)
+                self.note(now, trigger, spent(), 0, way.length, way.route.xy)
             if recovers:
                 return way
         if self._failures >= PATIENCE and trigger != SCANNED:
@@ -352,9 +352,9 @@ class Exploration(RouteGuide):
         if not self.lost:
             self._failures = 0
             route, tracked = self._route(pose, grid, plan, avoided)
-            self.note(now, trigger, time.perf_counter() - started, plan.work, plan.cost, route.xy)
+            self.note(now, trigger, spent(), plan.work, plan.cost, route.xy)
             return tracked
-        self.note(now, trigger, time.perf_counter() - started, plan.work)
+        self.note(now, trigger, spent(), plan.work)
         self._failures += 1
         self._recovery.note_rest(now, pose)
         if self._failures >= PATIENCE:

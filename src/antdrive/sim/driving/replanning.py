@@ -15,12 +15,12 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-import time
 from collections.abc import Callable
 
 import numpy as np
 
 from antdrive.base import Floats, Point, Pose
+from antdrive.base.kernel_cache import clock, compiled
 from antdrive.base.plane import polyline_length
 from antdrive.planners import (
     AStar,
@@ -101,12 +101,13 @@ class Replanning(OneRoute):
             self.blockage.note_gaps(tick, pose[:2], tracked, arc)
         return due
 
+    @compiled()
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """Return a new path from a pose [m, m, rad]; None if there is none."""
         now = tick / self._hz
         self._replanned_at = now
         self._ahead.reset_wait()
-        started = time.perf_counter()
+        spent = clock()
         # Near the goal, local avoidance is enough.
         around_movers = self.policy.around_movers and trigger != MISSED and not self._timed
         discs = self._ahead.discs(tick, pose) if around_movers else []
@@ -131,7 +132,7 @@ class Replanning(OneRoute):
             smoothing = "none" if self._timed else self._routes.smoothing
             route = smooth(plan, self._grid, with_obstacles(task, discs), kind=smoothing)
             self._track(plan, route)
-        wall_s = time.perf_counter() - started
+        wall_s = spent()
         if route is None:
             self.note(now, trigger, wall_s, plan.work)
             self.blockage.failed(tick, pose)
@@ -193,11 +194,12 @@ class CellByCell(Replanning):
             return ""
         return DECISION if tracked.length - arc < DECIDE_BEFORE * self._grid.cell else ""
 
+    @compiled()
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """Return the path to the next cell; None if the robot waits."""
         if trigger == MISSED:  # before arrival the next decision is due soon
             return super().replan(tick, pose, trigger) if self._arrived else None
-        now, started = tick / self._hz, time.perf_counter()
+        now, spent = tick / self._hz, clock()
         self._replanned_at = now
         covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
         with planner_errors(self._routes.planner):
@@ -215,7 +217,7 @@ class CellByCell(Replanning):
         else:
             self._note_no_path(tick, pose)
         if to is not None and bool(np.ptp(xy, axis=0).any()):
-            self.note(now, trigger, time.perf_counter() - started, work, polyline_length(xy), xy)
+            self.note(now, trigger, spent(), work, polyline_length(xy), xy)
             return self._prepare(Route(xy))
         if tick == 0:  # the robot waits in place and must not follow the plan's whole route
             heading = np.array([(0.0, 0.0), (math.cos(pose[2]), math.sin(pose[2]))])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from antdrive.robots._kernels_footprint import outer_radius
 from antdrive.worlds._kernels import Array, leaf, polygon_distance
 
 
@@ -83,9 +84,7 @@ def nearest_approaches(poses: Array, shape: Array, corners: Array, discs: Array,
     `shape` and `corners` are those of `footprint_clearances`. Over a disc's centre, the distance is minus its radius.
     """
     hx, hy, rounding = shape[0], shape[1], shape[2]
-    radius = math.hypot(hx, hy) + rounding
-    for k in range(corners.shape[0]):
-        radius = max(radius, math.hypot(corners[k, 0], corners[k, 1]) + rounding)
+    radius = outer_radius(hx, hy, rounding, corners)
     for j in range(discs.shape[0]):
         rows[j], best = 0, math.inf
         for i in range(poses.shape[0]):

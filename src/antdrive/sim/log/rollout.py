@@ -518,3 +518,19 @@ def scans_logged(taken: Iterable[tuple[int, Floats]], per_tick: int, rows: int) 
 def estimates_of(rollout: Rollout) -> Floats:
     """Return the estimated pose in each row, x, y [m] and yaw [rad] (T, 3): the true one of a perfect robot."""
     return rollout.estimate if len(rollout.estimate) else rollout.pose
+
+
+def log_at(path: Path) -> Path:
+    """Return the log at a path: the file itself, or the log in a run's folder.
+
+    Raises:
+        InputError: the folder holds no log.
+    """
+    if not path.is_dir():
+        return path
+    log = path / "rollout.npz"
+    if log.exists():
+        return log
+    ran = (path / "result.json").exists()
+    hint = "its run ended before the robot drove" if ran else "name a folder written by antdrive run"
+    raise InputError(f"{path}: contains no rollout.npz; {hint}")

@@ -61,14 +61,10 @@ def pixel_box(
 
 
 @inline
-def _at(inv: Array, px: float, py: float) -> tuple[float, float, float]:
+def ground_at(inv: Array, px: float, py: float) -> tuple[float, float, float]:
     """Return the ground point at a pixel's centre and its homogeneous scale."""
     w = inv[2, 0] * px + inv[2, 1] * py + inv[2, 2]
-    return (
-        (inv[0, 0] * px + inv[0, 1] * py + inv[0, 2]) / w,
-        (inv[1, 0] * px + inv[1, 1] * py + inv[1, 2]) / w,
-        w,
-    )
+    return (inv[0, 0] * px + inv[0, 1] * py + inv[0, 2]) / w, (inv[1, 0] * px + inv[1, 1] * py + inv[1, 2]) / w, w
 
 
 @inline
@@ -100,7 +96,7 @@ def lay_floor(
             inside[row, col] = False
             if not ground[row, col]:
                 continue
-            x, y, w = _at(inv, col + 0.5, row + 0.5)
+            x, y, w = ground_at(inv, col + 0.5, row + 0.5)
             out = max(max(bounds[0] - x, x - bounds[2]), max(bounds[1] - y, y - bounds[3]))
             line = 0.0
             if out < 0.0:
@@ -128,19 +124,10 @@ def cast_shadows(shade: Array, fwd: Array, inv: Array, discs: Array, sun_x: floa
         length2 = dx * dx + dy * dy
         near = 0.10 + 0.35 * radius
         pad = radius + near + 0.15 * tall
-        left, top, right, bottom = pixel_box(
-            fwd,
-            inv,
-            min(ax, ax + dx) - pad,
-            min(ay, ay + dy) - pad,
-            max(ax, ax + dx) + pad,
-            max(ay, ay + dy) + pad,
-            width,
-            height,
-        )
+        left, top, right, bottom = capsule_box(fwd, inv, ax, ay, ax + dx, ay + dy, pad, width, height)
         for row in range(top, bottom):
             for col in range(left, right):
-                x, y, _ = _at(inv, col + 0.5, row + 0.5)
+                x, y, _ = ground_at(inv, col + 0.5, row + 0.5)
                 ex, ey = x - ax, y - ay
                 t = min(1.0, max(0.0, (ex * dx + ey * dy) / length2)) if length2 > 0.0 else 0.0
                 soft = 0.02 + 0.22 * tall * t * math.sqrt(length2) / max(tall, 1e-9)
@@ -158,16 +145,7 @@ def cover_capsules(cover: Array, fwd: Array, inv: Array, rows: Array) -> None:
     height, width = cover.shape
     for i in range(rows.shape[0]):
         ax, ay, bx, by, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4]
-        left, top, right, bottom = pixel_box(
-            fwd,
-            inv,
-            min(ax, bx) - half,
-            min(ay, by) - half,
-            max(ax, bx) + half,
-            max(ay, by) + half,
-            width,
-            height,
-        )
+        left, top, right, bottom = capsule_box(fwd, inv, ax, ay, bx, by, half, width, height)
         for row in range(top, bottom):
             for col in range(left, right):
                 value = capsule_cover(inv, row, col, ax, ay, bx, by, half)
@@ -176,9 +154,18 @@ def cover_capsules(cover: Array, fwd: Array, inv: Array, rows: Array) -> None:
 
 
 @kernel
+def capsule_box(
+    fwd: Array, inv: Array, ax: float, ay: float, bx: float, by: float, half: float, width: int, height: int
+) -> tuple[int, int, int, int]:
+    """Return the pixel bounds x0, y0, x1, y1 of a capsule; empty behind the camera."""
+    x0, y0, x1, y1 = min(ax, bx) - half, min(ay, by) - half, max(ax, bx) + half, max(ay, by) + half
+    return pixel_box(fwd, inv, x0, y0, x1, y1, width, height)
+
+
+@kernel
 def capsule_cover(inv: Array, row: int, col: int, ax: float, ay: float, bx: float, by: float, half: float) -> float:
     """Return the fraction of a pixel that a capsule covers."""
-    x, y, w = _at(inv, col + 0.5, row + 0.5)
+    x, y, w = ground_at(inv, col + 0.5, row + 0.5)
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
     t = 0.0
@@ -202,7 +189,7 @@ def cover_rings(cover: Array, fwd: Array, inv: Array, rows: Array) -> None:
         left, top, right, bottom = pixel_box(fwd, inv, cx - reach, cy - reach, cx + reach, cy + reach, width, height)
         for row in range(top, bottom):
             for col in range(left, right):
-                x, y, w = _at(inv, col + 0.5, row + 0.5)
+                x, y, w = ground_at(inv, col + 0.5, row + 0.5)
                 ex, ey = x - cx, y - cy
                 distance = math.sqrt(ex * ex + ey * ey) + 1e-12
                 span = _span(inv, x, y, w, ex / distance, ey / distance)
@@ -259,11 +246,7 @@ def resolve(rgb: Array, image: Array, seg: Array, factor: int, visible: Array, o
             share = visible[row, col]
             red, green, blue = 0.0, 0.0, 0.0
             if share > 0.0:
-                red, green, blue = (
-                    rgb[row, col, 0] * share,
-                    rgb[row, col, 1] * share,
-                    rgb[row, col, 2] * share,
-                )
+                red, green, blue = rgb[row, col, 0] * share, rgb[row, col, 1] * share, rgb[row, col, 2] * share
             if share < 1.0:
                 for i in range(factor):
                     for j in range(factor):
@@ -292,16 +275,7 @@ def draw_trail(
     height, width = canvas.shape[0], canvas.shape[1]
     for i in range(rows.shape[0]):
         ax, ay, bx, by, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4]
-        left, top, right, bottom = pixel_box(
-            fwd,
-            inv,
-            min(ax, bx) - half,
-            min(ay, by) - half,
-            max(ax, bx) + half,
-            max(ay, by) + half,
-            width,
-            height,
-        )
+        left, top, right, bottom = capsule_box(fwd, inv, ax, ay, bx, by, half, width, height)
         for row in range(top, bottom):
             for col in range(left, right):
                 value = capsule_cover(inv, row, col, ax, ay, bx, by, half)
@@ -327,16 +301,7 @@ def blend_capsules(
     height, width = visible.shape
     for i in range(rows.shape[0]):
         ax, ay, bx, by, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4]
-        left, top, right, bottom = pixel_box(
-            fwd,
-            inv,
-            min(ax, bx) - half,
-            min(ay, by) - half,
-            max(ax, bx) + half,
-            max(ay, by) + half,
-            width,
-            height,
-        )
+        left, top, right, bottom = capsule_box(fwd, inv, ax, ay, bx, by, half, width, height)
         for row in range(top, bottom):
             for col in range(left, right):
                 weight = capsule_cover(inv, row, col, ax, ay, bx, by, half) * strength * visible[row, col]
@@ -365,21 +330,12 @@ def shade_body(
     places = 5 if sun[0] != 0.0 or sun[1] != 0.0 else 1  # along the shadow
     unlit2 = (shape[2] + 0.5 * soft) ** 2 * (1.0 + 1e-9)  # squared distance of the shadow's end
     reach = math.hypot(shape[0], shape[1]) + shape[2] + soft
-    left, top, right, bottom = pixel_box(
-        fwd,
-        inv,
-        cx + min(0.0, sun[0]) - reach,
-        cy + min(0.0, sun[1]) - reach,
-        cx + max(0.0, sun[0]) + reach,
-        cy + max(0.0, sun[1]) + reach,
-        width,
-        height,
-    )
+    left, top, right, bottom = capsule_box(fwd, inv, cx, cy, cx + sun[0], cy + sun[1], reach, width, height)
     for row in range(top, bottom):
         for col in range(left, right):
             if visible[row, col] <= 0.0:
                 continue
-            x, y, _ = _at(inv, col + 0.5, row + 0.5)
+            x, y, _ = ground_at(inv, col + 0.5, row + 0.5)
             apart2 = 1e30
             for i in range(places):
                 ex, ey = x - cx - sun[0] * i / 4, y - cy - sun[1] * i / 4
@@ -474,7 +430,7 @@ def lay_field(
         for col in range(frame.shape[1]):
             if visible[row, col] <= 0.0:
                 continue
-            x, y, _ = _at(inv, col + 0.5, row + 0.5)
+            x, y, _ = ground_at(inv, col + 0.5, row + 0.5)
             r, c = math.floor((y - y0) / cell + 0.5), math.floor((x - x0) / cell + 0.5)
             if r < 0 or c < 0 or r >= levels.shape[0] or c >= levels.shape[1] or math.isnan(levels[r, c]):
                 continue

@@ -23,6 +23,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from antdrive.base.atomic import atomic_write
+from antdrive.base.errors import FieldError
 from antdrive.base.files import file_name, known_suffix
 from antdrive.base.types import Floats
 from antdrive.runs.pool import Pool, cores
@@ -127,11 +128,14 @@ def still(
 
     Raises:
         InputError: an unknown camera, a suffix other than .png and .webp, or a size out of range.
+        FieldError: the drive ends before the time.
     """
     target = Path(path)
     kind = known_suffix(target, STILLS)
     shot = Shot(rollout, **asdict(FilmOptions(camera=camera, size=size, note=note).checked()))
-    picture = shot.last_frame() if t is None else shot.frame(min(max(float(t), 0.0), shot.playback.duration))
+    if t is not None and not 0.0 <= t <= shot.playback.duration:
+        raise FieldError("at", f"{t:g} s is outside the drive, which lasts {shot.playback.duration:.2f} s")
+    picture = shot.last_frame() if t is None else shot.frame(float(t))
     with atomic_write(target) as temporary:
         Image.fromarray(picture).save(temporary, format=kind[1:], **STILLS[kind])
     return target

@@ -9,7 +9,7 @@ import base64
 import io
 import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from antdrive.base.errors import InputError
@@ -57,23 +57,37 @@ def filmed(run: Run) -> list[Attachment]:
         return [Attachment(path.name, _data_uri("video/mp4", read_bytes(path, MAX_BYTES, "a film")), is_video=True)]
 
 
-def attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
-    """Attach the films and files of a run's folder. Films and pictures of an earlier drive are only linked."""
-    assert run.folder is not None
-    for path in sorted(run.folder.iterdir()):
-        kind = FILM_TYPES.get(path.suffix.lower())
-        if kind is None or not _lies_in(path, run.folder):
-            continue
-        if age := _older(path, run.folder):
-            run.links.append(Attachment(path.name + age, link_to(path, base)))
-            continue
-        source = _data_uri(kind, read_bytes(path, MAX_BYTES, "a film")) if embed_films else link_to(path, base)
-        run.films.append(Attachment(path.name, source, is_video=kind.startswith("video/")))
-    for names, attached in ((("rollout.npz", "result.json"), run.links), (("overview.png", "plan.png"), run.pictures)):
-        for path in (run.folder / name for name in names):
-            if _lies_in(path, run.folder):
-                age = _older(path, run.folder) if attached is run.pictures else ""
-                (run.links if age else attached).append(Attachment(path.name + age, link_to(path, base)))
+def attach_files(runs: Sequence[ReportedRun], base: Path, *, page: bool, figures: bool, embed_films: bool) -> None:
+    """Attach films, files and figures of the runs' folders; those of an earlier drive are only linked.
+
+    A page embeds figures, kind by kind, up to `EMBEDDED_BYTES`, and links the others; Markdown shows overviews and plans.
+    """
+    folders = [(run, run.folder) for run in runs if run.folder is not None]
+    for run, folder in folders:
+        for path in sorted(path for path in folder.iterdir() if _lies_in(path, folder)):
+            if kind := FILM_TYPES.get(path.suffix.lower()):
+                age, embed = _older(path, folder), embed_films and page
+                source = (
+                    _data_uri(kind, read_bytes(path, MAX_BYTES, "a film")) if embed and not age else link_to(path, base)
+                )
+                (run.links if age else run.films).append(Attachment(path.name + age, source, kind.startswith("video/")))
+            elif path.name in ("rollout.npz", "result.json"):
+                run.links.append(Attachment(path.name, link_to(path, base)))
+    used = sum(len(figure.source) for run in runs for figure in run.figures)
+    for name in (FIGURE_CAPTIONS if figures else ()) if page else ("overview.png", "plan.png"):
+        for run, folder in folders:
+            path = folder / name
+            if not _lies_in(path, folder):
+                continue
+            age = _older(path, folder)
+            figure = Attachment(name + age, link_to(path, base))
+            if (
+                page
+                and not age
+                and used + len((small := embedded(path, FIGURE_CAPTIONS[name])).source) <= EMBEDDED_BYTES
+            ):
+                used, figure = used + len(small.source), small
+            (run.links if age or (page and not figure.caption) else run.figures).append(figure)
 
 
 def _older(path: Path, folder: Path) -> str:
@@ -86,23 +100,6 @@ def _older(path: Path, folder: Path) -> str:
 def _lies_in(path: Path, folder: Path) -> bool:
     """Return whether a path, with links resolved, is a regular file in a folder."""
     return path.is_file() and path.resolve().is_relative_to(folder.resolve())
-
-
-def attach_figures(runs: list[ReportedRun], base: Path) -> None:
-    """Embed figures of the runs' folders, kind by kind, up to `EMBEDDED_BYTES`; link the others."""
-    used = sum(len(figure.source) for run in runs for figure in run.figures)
-    for name, caption in FIGURE_CAPTIONS.items():
-        for run in runs:
-            path = None if run.folder is None else run.folder / name
-            if path is None or not _lies_in(path, path.parent):
-                continue
-            age = _older(path, path.parent)
-            figure = None if age else embedded(path, caption)
-            if figure is not None and used + len(figure.source) <= EMBEDDED_BYTES:
-                used += len(figure.source)
-                run.figures.append(figure)
-            else:
-                run.links.append(Attachment(name + age, link_to(path, base)))
 
 
 def embedded(path: Path, caption: str) -> Attachment:

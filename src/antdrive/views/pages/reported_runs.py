@@ -61,10 +61,9 @@ class ReportedRun:
     problems: list[str]  # of the certificate, and contradictions between result.json and the log, a sentence each
     faults: list[str]  # failures of the run's test, as claimed by result.json, a sentence each
     details: list[tuple[str, list[tuple[str, str]]]]  # names and values under headings
-    figures: list[Attachment] = field(default_factory=list)  # embedded figures
+    figures: list[Attachment] = field(default_factory=list)  # figures, embedded; of the Markdown report beside it
     films: list[Attachment] = field(default_factory=list)  # films, embedded or linked
     links: list[Attachment] = field(default_factory=list)  # files beside the page
-    pictures: list[Attachment] = field(default_factory=list)  # figures beside the page, for the Markdown report
 
     @property
     def badge(self) -> str:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from antdrive.base.errors import FieldError, input_error
+from antdrive.base.files import file_name
+from antdrive.worlds.files.world_file import save_task
 from antdrive.worlds.formats.barn import import_barn
 from antdrive.worlds.formats.dynabarn import import_dynabarn
-from antdrive.worlds.formats.map_server import import_map_server
+from antdrive.worlds.formats.map_server import import_map_server, kept_tasks
 from antdrive.worlds.formats.movingai import import_movingai_task
 from antdrive.worlds.formats.sdf import import_sdf
 from antdrive.worlds.world import Task
@@ -109,6 +111,28 @@ def import_file(path: str | os.PathLike[str], *, barn: bool = False, **options: 
             brings = "has its own" if key in _OF_EVERY_TASK else f"takes only {_listed(file_format.options)}"
             raise FieldError(key, f"{file_format.name} {brings}")
     return file_format.read(Path(path), **given)
+
+
+def save_imported(path: Path, tasks: Sequence[Task], target: Path) -> list[Path]:
+    """Write imported tasks as world files and return the files.
+
+    Args:
+        path: the imported file; a map written by antdrive holds named tasks, which go into the world file
+        tasks: its tasks
+        target: the world file; of a set of worlds, the folder of their files
+
+    Raises:
+        InputError: two worlds of a set map to one file.
+    """
+    if import_format(path) is IMPORTS["dynabarn"]:
+        files = [target / f"{file_name(task.world.name)}.yaml" for task in tasks]
+        if twice := next((file for i, file in enumerate(files) if file in files[:i]), None):
+            raise input_error(str(path), f"two worlds map to {twice}; give them different names")
+    else:
+        files = [target]
+    for task, file in zip(tasks, files, strict=True):
+        save_task(task, file, kept_tasks(path, task) if import_format(path) is IMPORTS["map_server"] else {})
+    return files
 
 
 def _listed(options: tuple[str, ...]) -> str:

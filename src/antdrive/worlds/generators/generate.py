@@ -253,14 +253,19 @@ GENERATORS: Mapping[str, Callable[..., Task]] = MappingProxyType({"forest": fore
 
 
 def generate(
-    kind: str, rng: np.random.Generator, options: Mapping[str, str], *, name: str | None = None, note: str = ""
+    kind: str,
+    seed: int | np.random.Generator = 0,
+    options: Mapping[str, Any] = MappingProxyType({}),
+    *,
+    name: str | None = None,
+    note: str = "",
 ) -> Task:
-    """Generate a random world, with options as text.
+    """Generate a random world.
 
     Args:
         kind: a name of `GENERATORS`
-        rng: the source of randomness
-        options: the generator's arguments by name, such as {"count": "20", "radius": "0.2,0.5"}
+        seed: the random seed, or a source of randomness
+        options: the generator's arguments by name, as numbers or text, such as {"count": 20, "radius": "0.2,0.5"}
         name: the world's name; by default the kind
         note: text appended to the world's source
 
@@ -280,7 +285,7 @@ def generate(
             raise input_error(kind, key, f"unknown option; choose from {', '.join(defaults)}")
         values[key] = _value(kind, key, text, defaults[key])
     try:
-        task = GENERATORS[kind](rng, **values)
+        task = GENERATORS[kind](np.random.default_rng(seed), **values)
     except FieldError as error:
         raise input_error(kind, *([error.key] if error.key != kind else []), error.problem) from None
     source = "; ".join(part for part in (task.world.source, note) if part)
@@ -290,11 +295,12 @@ def generate(
 @cached(64)
 def generated(kind: str, seed: int, options: tuple[tuple[str, str], ...]) -> Task:
     """Generate the world of {generate: KIND, seed: SEED} with options in a file."""
-    return generate(kind, np.random.default_rng(seed), dict(options), name=f"{kind}-{seed}", note=f"seed {seed}")
+    return generate(kind, seed, dict(options), name=f"{kind}-{seed}", note=f"seed {seed}")
 
 
-def _value(kind: str, key: str, text: str, default: Any) -> Any:
-    """Convert an option's text to the default's type."""
+def _value(kind: str, key: str, given: Any, default: Any) -> Any:
+    """Convert an option to the default's type."""
+    text = ",".join(map(str, given)) if isinstance(given, tuple | list) else str(given)
     words, convert = text.split(","), int if isinstance(default, int) else float
     count = len(default) if isinstance(default, tuple) else 1
     one = "a whole number" if convert is int else "a number"
