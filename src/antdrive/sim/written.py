@@ -47,15 +47,7 @@ def unchosen(s: Scenario) -> Scenario:
     return s
 
 
-_KINDS: Mapping[str, Any] = {
-    "world": (str, dict),
-    "planner": (str, dict),
-    "start": (list, tuple),
-    "goal": (list, tuple),
-    "task": str,
-    "robot": str,
-    "seed": int,
-}
+_KINDS: Mapping[str, Any] = {"start": (list, tuple), "goal": (list, tuple), "task": str, "robot": str, "seed": int}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +88,7 @@ class Written:
         """
         own = {one.name for one in dataclasses.fields(cls)} - {"settings", "options"}
         planner = data.get("planner", "ants")
-        options = {} if isinstance(planner, str) else dict(planner)
+        options = dict(planner) if isinstance(planner, dict) else {}
         name = planner if isinstance(planner, str) else options.pop("name", None)
         if not isinstance(name, str):
             raise FieldError("planner.name", "missing; write the planner's name, or FILE.py:CLASS or MODULE:CLASS")
@@ -110,6 +102,9 @@ class Written:
             wanted = _KINDS.get(key)
             if wanted is not None and not isinstance(value, wanted):
                 raise FieldError(key, f"has another type, got {show(value)}")
+        world = data.get("world")
+        if not isinstance(world.get("generate") if isinstance(world, dict) else world, str):
+            raise FieldError("world", "write a file, a name of the catalogue, or {generate: forest, seed: 7}")
         for key, count in (("start", 3), ("goal", 2)):
             ends = given.get(key, [0.0] * count)
             if len(ends) != count or not all(isinstance(number, int | float) for number in ends):
@@ -206,9 +201,7 @@ class Written:
         from antdrive.worlds.generators.generate import generated
 
         options = dict(world)
-        kind, seed = options.pop("generate", None), options.pop("seed", 0)
-        if not isinstance(kind, str):
-            raise FieldError("world", "write a file, a name of the catalogue, or {generate: forest, seed: 7}")
+        kind, seed = options.pop("generate"), options.pop("seed", 0)
         if self.task is not None:
             raise FieldError("task", "a random world has no named tasks")
         if type(seed) is not int or not 0 <= seed < 2**63:
