@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.atomic import folder_lock
 from antdrive.base.errors import InputError
+from antdrive.base.tables import file_lines, marked
 from antdrive.cli import options
-from antdrive.cli.console import bar, file_lines, marked, planning, show, stage, this_command
+from antdrive.cli.console import bar, planning, show, stage, this_command
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, print_idle_settings
 from antdrive.cli.scenario_options import Ends, Setup
