@@ -162,8 +162,9 @@ sweep c.yaml -o out/new --report a.md --dry-run
 sweep c.yaml -o out/new --report all.doc
 sweep c.yaml -o out/new --run-limit 0
 sweep c.yaml -o out/new --seeds 1,b
-sweep c.yaml -o out/new -p as:ants
-sweep c.yaml -o out/new -p as:ants=1..x..2
+sweep c.yaml -o out/new -p as --set as.ants
+sweep c.yaml -o out/new --set as.ants=3
+sweep c.yaml -o out/new -p as --set as.ants=1..x..2
 sweep nowhere.yaml -o out
 verify nothing.npz
 verify runs

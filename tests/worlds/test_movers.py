@@ -124,17 +124,11 @@ def test_teleport_appears_at_the_first_place_and_says_when():
     assert later.jump_times(4.0)[0].tolist() == [0.5, 3.5]
 
 
-@pytest.mark.parametrize("loop", ["pingpong", "once"])
-def test_only_teleporting_loops_jump(loop):
-    moving = trajectories(Keyframed(radius=0.3, keyframes=ELL, loop=loop))
+@pytest.mark.parametrize(("loop", "frames"), [("pingpong", ELL), ("once", ELL), ("teleport", (*ELL, (6.0, 2.0, 2.0)))])
+def test_only_teleporting_loops_that_are_not_closed_jump(loop, frames):
+    moving = trajectories(Keyframed(radius=0.3, keyframes=frames, loop=loop))
     assert not moving.jumps(FINE).any()
     assert len(moving.jump_times(40)[0]) == 0
-
-
-def test_a_closed_loop_does_not_jump():
-    mover = Keyframed(radius=0.3, keyframes=(*ELL, (6.0, 2.0, 2.0)), loop="teleport")
-    assert not trajectories(mover).jumps(FINE).any()
-    assert len(trajectories(mover).jump_times(40)[0]) == 0
 
 
 @given(keyframed(interpolation="catmull-rom"))

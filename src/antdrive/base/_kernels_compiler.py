@@ -39,7 +39,7 @@ else:
     _SETTINGS |= {"cache": folder is not None}
     _UNCOUNTED = {}
     if folder is not None:  # numba does not notice that a kernel of another file has changed
-        numba.config.CACHE_DIR = str(folder / f"antdrive-{sources_stamp()[:16]}")  # type: ignore[attr-defined]
+        vars(numba.config)["CACHE_DIR"] = str(folder / f"antdrive-{sources_stamp()[:16]}")
     if multiprocessing.parent_process() is None:
         sys.stderr.write(_UNTRIED.format(numba.__version__, *TRIED[0], *TRIED[1]))
 

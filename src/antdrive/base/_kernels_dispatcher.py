@@ -33,7 +33,7 @@ from antdrive.base import kernel_cache, system
 from antdrive.base._kernels_interpreter import ALLOWANCE, interpret
 from antdrive.base.errors import InputError
 from antdrive.base.files import MAX_BYTES, read_bytes
-from antdrive.base.kernel_cache import cache_folder, default_folders, sources_stamp, uncollected
+from antdrive.base.kernel_cache import account, cache_folder, default_folders, sources_stamp, uncollected
 
 _settings: Any = config  # its attributes are set on import
 LOCK = "antdrive-compiling.lock"  # in each folder of machine code
@@ -204,6 +204,10 @@ class _Kernel(CPUDispatcher):  # type: ignore[misc]
     def _compiler(self) -> Any:
         return self.numba_compiler if isinstance(self._cache, NullCache) else _Compiler(self, self._cache)
 
+    def _compile_for_args(self, *args: Any, **named: Any) -> Any:
+        with account:  # numba's lock does not cover the whole
+            return super()._compile_for_args(*args, **named)
+
 
 class _Uncompiled(_Kernel):
     """The class of a kernel until it is compiled; calls of a `_Kernel` cost no more than numba's."""
@@ -211,12 +215,17 @@ class _Uncompiled(_Kernel):
     left = ALLOWANCE
 
     def __call__(self, *args: Any, **named: Any) -> Any:
-        if not self.overloads and not getattr(self._cache, "holds_any", False):
+        with account:
+            compiled = bool(self.overloads or getattr(self._cache, "holds_any", False))
+        if not compiled:
             self.left, result = interpret(self.py_func, args, named, self.left)
             if self.left > 0:
                 kernel_cache.interpreted += 1
                 return result
         self.__class__ = _Kernel
+        with account:
+            for value in args:
+                self.typeof_pyval(value)  # slow at its first call
         return self(*args, **named)
 
 
@@ -271,17 +280,17 @@ def _resolving_once() -> Iterator[None]:
         _function.get_call_type = before
 
 
-class _Listener(event.Listener):  # type: ignore[misc]
+class _LoadingTime(event.Listener):  # type: ignore[misc]
     """Account for the time in which numba loads or compiles, of kernels of others, too."""
 
     def on_start(self, _: Any) -> None:
-        kernel_cache.account.begin()
+        account.__enter__()
 
     def on_end(self, _: Any) -> None:
-        kernel_cache.account.end()
+        account.__exit__()
 
 
-event.register("numba:compiler_lock", _Listener())
+event.register("numba:compiler_lock", _LoadingTime())
 
 
 def _choose_folder() -> None:

@@ -143,12 +143,12 @@ def _codes(file: str) -> dict[str, types.CodeType]:
     with kernel_cache.uncollected():
         tree, functions = ast.parse(kernel_cache.text_of(Path(file)), file), list[ast.stmt]()
         for function in tree.body:
-            nodes = list(ast.walk(function)) if isinstance(function, ast.FunctionDef) else []
+            nodes = list(ast.walk(function))
             if isinstance(function, ast.FunctionDef) and not any(map(_is_product, nodes)):
                 function.decorator_list = []
                 functions.append(function)
-            for node in nodes:
-                if isinstance(node, _COUNTED):
-                    node.body.insert(0, _TICK)
+                for node in nodes:
+                    if isinstance(node, _COUNTED):
+                        node.body.insert(0, _TICK)
         whole = compile(ast.Module(functions, []), file, "exec")
         return {code.co_name: code for code in whole.co_consts if isinstance(code, types.CodeType)}

@@ -8,14 +8,14 @@ import json
 import math
 import numbers
 import os
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, cast
 
 from pydantic import AfterValidator, BeforeValidator, TypeAdapter, ValidationError
 
 from antdrive.base.document import Document, Location
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, InputError
 from antdrive.base.records import attributes_of
 
 R = TypeVar("R")
@@ -262,3 +262,20 @@ def _as_number(value: Any) -> str:
     else:
         right = yaml_number(number)
     return f" (text); write {right}"
+
+
+def pair(text: str, option: str = "--set") -> tuple[str, str]:
+    """Parse KEY=VALUE of `--set` or a similar option."""
+    key, mark, value = text.partition("=")
+    if not mark or not key:
+        raise InputError(f"{option} {text}: must be KEY=VALUE")
+    return key.strip(), value.strip()
+
+
+def grouped(text: str, groups: Collection[str]) -> tuple[str, str, str]:
+    """Parse GROUP.KEY=VALUE of `--set`."""
+    key, value = pair(text)
+    group, _, name = key.partition(".")
+    if group not in groups or not name:
+        raise InputError(f"--set {text}: must be GROUP.KEY=VALUE; groups are {', '.join(groups)}")
+    return group, name, value

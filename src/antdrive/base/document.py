@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import yaml
 
-from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.errors import FieldError, InputError, input_error, visible
 from antdrive.base.files import parse_json, read_bytes
 
 Location: TypeAlias = tuple[str | int, ...]  # the path to a value: ("obstacles", 0, "radius")
@@ -44,7 +44,8 @@ class Document:
         """Return the error for a value: source, line if known, key and problem."""
         line = next((self.lines[p] for p in _prefixes(location) if p in self.lines), None)
         place = self.source if line is None else f"{self.source}:{line}"
-        return input_error(place, *([_key(location)] if location else []), problem)
+        key = _key(location) if location else ""
+        return InputError(visible(": ".join(filter(None, (place, key, problem)))), problem=visible(problem), within=key)
 
     def field_error(self, error: FieldError, *above: str | int) -> InputError:
         """Return the error for a record's field read from this document."""

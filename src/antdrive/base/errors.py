@@ -11,12 +11,13 @@ class InputError(ValueError):
 
     Attributes:
         key: what a person wrote wrongly, such as "planner.ants"; empty if the message says where
-        problem: the message without a place, if there is a key
+        problem: the message without key and place
+        within: the key in a file, if the message has file and key
     """
 
-    def __init__(self, message: str, key: str = "", problem: str = "") -> None:
+    def __init__(self, message: str, key: str = "", problem: str = "", within: str = "") -> None:
         super().__init__(message)
-        self.key = key
+        self.key, self.within = key, within
         self.problem = problem or message
 
 

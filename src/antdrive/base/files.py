@@ -32,7 +32,7 @@ def summary_of(path: Path) -> str:
 
 def as_json(value: Any) -> str:
     """Format a value as indented strict JSON: infinities and nan become null."""
-    return json.dumps(_json_value(value), indent=2, allow_nan=False)
+    return json.dumps(json_value(value), indent=2, allow_nan=False)
 
 
 def parse_json(text: str | bytes, **options: Any) -> Any:
@@ -76,15 +76,16 @@ def known_suffix(path: Path, choices: Collection[str]) -> str:
     return suffix
 
 
-def _json_value(value: Any) -> Any:
+def json_value(value: Any) -> Any:
+    """Return a plain value for JSON: tuples as lists, null for numbers that are not finite."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
-        return {str(key): _json_value(item) for key, item in value.items()}
+        return {str(key): json_value(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_json_value(item) for item in value]
+        return [json_value(item) for item in value]
     if hasattr(value, "item"):
-        return _json_value(value.item())
+        return json_value(value.item())
     return value
 
 

@@ -68,8 +68,11 @@ class OverLimit(BaseException):
     """User code took longer than the limit on planning time."""
 
 
-def plan_limit() -> float | None:
+def plan_limit(name: str = LIMIT) -> float | None:
     """Return the limit on planning time of this process and those that it starts [s]; None for no limit.
+
+    Args:
+        name: where the limit was written, for messages
 
     Raises:
         InputError: the variable of the environment is neither a positive number nor "off".
@@ -82,7 +85,7 @@ def plan_limit() -> float | None:
     except ValueError:
         seconds = 0.0
     if not 0 < seconds <= LONGEST_LIMIT:
-        raise input_error(LIMIT, f"must be seconds, at most {LONGEST_LIMIT:.0e}, or off; got {text!r:.40}")
+        raise input_error(name, f"must be seconds, at most {LONGEST_LIMIT:.0e}, or off; got {text!r:.40}")
     return seconds
 
 

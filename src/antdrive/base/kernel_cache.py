@@ -44,18 +44,16 @@ def compiled() -> Iterator[None]:
 
 
 class _Account(threading.local):
-    """The seconds in which this thread loaded and compiled kernels."""
+    """The seconds that this thread has spent in blocks that load or compile kernels, which may nest."""
 
     depth, since, seconds = 0, 0.0, 0.0
 
-    def begin(self) -> None:
-        """Begin to load or compile; this may nest."""
+    def __enter__(self) -> None:
         if not self.depth:
             self.since = time.perf_counter()
         self.depth += 1
 
-    def end(self) -> None:
-        """End what began last."""
+    def __exit__(self, *_: object) -> None:
         self.depth -= 1
         if not self.depth:
             self.seconds += time.perf_counter() - self.since

@@ -4,22 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from antdrive.base.checks import grouped
 from antdrive.base.errors import FieldError, InputError
-from antdrive.cli.scenario_options import GROUPS, grouped
+from antdrive.cli.scenario_options import GROUPS, Setup
 from antdrive.planners.user_code import label_names
 
 MAX_PLANNERS = 6
-
-
-@dataclass(frozen=True)
-class Entrant:
-    """A labelled planner with its options."""
-
-    label: str  # in tables, folders and `--set`
-    name: str  # the planner's name
-    settings: tuple[str, ...] = ()  # its `--set` values for `antdrive run`
 
 
 def check_worlds(words: Sequence[str]) -> None:
@@ -36,8 +27,8 @@ def check_worlds(words: Sequence[str]) -> None:
             raise InputError(error.problem) from None
 
 
-def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) -> list[Entrant]:
-    """Parse `--planner NAME` and `--planner LABEL=NAME` with their `--set GROUP.KEY=VALUE`."""
+def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None, robot: str) -> dict[str, Setup]:
+    """Parse `--planner NAME` and `--planner LABEL=NAME` with their `--set GROUP.KEY=VALUE`; return options of `run` by label."""
     words, labels = planners or (), dict[str, str]()
     for word in words:
         label, mark, name = word.partition("=")
@@ -59,4 +50,4 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) 
         group, name, value = grouped(text, (*labels, *GROUPS))
         for label in labels if group in GROUPS else [group]:
             own[label].append(f"{group if group == 'controller' else 'planner'}.{name}={value}")
-    return [Entrant(label, name, tuple(own[label])) for label, name in labels.items()]
+    return {label: Setup(name, own[label], robot) for label, name in labels.items()}

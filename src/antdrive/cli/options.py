@@ -96,10 +96,7 @@ def with_plan_limit(command: Command) -> Command:
     @functools.wraps(command)
     def called(*, plan_limit: str, **values: Any) -> Any:
         os.environ[guarded.LIMIT] = plan_limit
-        try:
-            guarded.plan_limit()
-        except InputError as error:
-            raise InputError(str(error).replace(guarded.LIMIT, "--plan-limit", 1)) from None
+        guarded.plan_limit("--plan-limit")
         return command(**values)
 
     text = "Limit on the time of each plan and replan [s], or off."

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from antdrive.base.checks import pair
 from antdrive.base.errors import InputError
 from antdrive.cli.console import print_error
 
@@ -39,14 +40,6 @@ def pose(option: str, text: str | None) -> tuple[float, ...] | None:
         return values
     values = numbers(option, f"{place},{degrees}", 3, "X,Y,YAW")
     return None if values is None else (*values[:2], math.radians(values[2]))
-
-
-def pair(text: str, option: str = "--set") -> tuple[str, str]:
-    """Parse KEY=VALUE of `--set` or a similar option."""
-    key, mark, value = text.partition("=")
-    if not mark or not key:
-        raise InputError(f"{option} {text}: must be KEY=VALUE")
-    return key.strip(), value.strip()
 
 
 def disc(text: str) -> Disc:

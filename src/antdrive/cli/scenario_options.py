@@ -3,15 +3,16 @@
 import dataclasses
 import functools
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
+from antdrive.base.checks import grouped
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.version import require_physics
 from antdrive.cli.console import bar, print_error
 from antdrive.cli.options import Planner, Robot, option
-from antdrive.cli.parse import numbers, pair, pose
+from antdrive.cli.parse import numbers, pose
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -110,15 +111,6 @@ class Setup:
             place, planner=self.planner, options=chosen["planner"], robot=self.robot, settings=settings, seed=seed
         )
         return words.scenario(at=functools.partial(at_option, words), choose=with_chosen_margin)
-
-
-def grouped(text: str, groups: Collection[str]) -> tuple[str, str, str]:
-    """Parse GROUP.KEY=VALUE of `--set`."""
-    key, value = pair(text)
-    group, _, name = key.partition(".")
-    if group not in groups or not name:
-        raise InputError(f"--set {text}: must be GROUP.KEY=VALUE; groups are {', '.join(groups)}")
-    return group, name, value
 
 
 def with_chosen_margin(scenario: "Scenario") -> "Scenario":

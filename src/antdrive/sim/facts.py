@@ -16,7 +16,6 @@ from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import METRICS, measure, succeeded
 from antdrive.sim.log.record import DriveRecord, SensingRecord, plain_value, settings_of
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.log.sights import passed
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
@@ -89,12 +88,24 @@ def _changes(log: LoggedRun) -> dict[str, Any]:
 
 
 def _sights(log: LoggedRun) -> list[dict[str, Any]] | None:
-    return [sight.as_dict() for sight in passed(log.rollout)] if len(log.rollout.scans) else None
+    if not len(log.rollout.scans):
+        return None
+    from antdrive.sim.log.sights import passed  # imported here, because it loads kernels
+
+    return [sight.as_dict() for sight in passed(log.rollout)]
+
+
+def _metric(name: str, log: LoggedRun) -> float:
+    return log.metrics[name]
+
+
+def _planned(run: Run) -> float | None:
+    return run.plan.line_length if run.plan.solved else None
 
 
 def _metrics() -> Iterator[Fact]:
     for name, metric in METRICS.items():
-        of: Callable[[LoggedRun], float] = functools.partial(lambda name, log: log.metrics[name], name)
+        of = functools.partial(_metric, name)
         more: dict[str, Any] = {"undriven": lambda run: run.plan.wall_s} if name == "plan_s" else {}
         yield Fact(name, metric.proof, of, unit=metric.unit, column="double", within="metrics", optional=True, **more)
 
@@ -126,16 +137,8 @@ _TABLE = (
     Fact("digest", "log", lambda log: log.rollout.digest, column="string"),
     Fact("drive_digest", "log", lambda log: log.rollout.drive_digest, column="string", within=None),
     *_metrics(),
-    Fact(
-        *("plan_length_m", "log", lambda log: log.record.plan.length_m),
-        lambda run: run.plan.line_length if run.plan.solved else None,
-        unit="m",
-        column="double",
-        within=None,
-    ),
-    Fact(
-        *("grid_optimum_m", "log", lambda log: log.record.plan.grid_optimum_m), unit="m", column="double", within=None
-    ),
+    Fact("plan_length_m", "log", lambda log: log.record.plan.length_m, _planned, "m", "double", None),
+    Fact("grid_optimum_m", "log", lambda log: log.record.plan.grid_optimum_m, unit="m", column="double", within=None),
     Fact("sights", "log", _sights, optional=True),
 )
 

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from antdrive.base.checks import resolve, show, suggest
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import file_name
-from antdrive.planners.user_code import is_user_code, record_name
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -87,7 +86,10 @@ class Written:
 
     @classmethod
     def read(cls, data: Mapping[str, Any]) -> Written:
-        """Return the scenario of plain data with the keys of a suite, and `seed`.
+        """Return the scenario of plain data.
+
+        Args:
+            data: values by the keys of a suite, and `seed`
 
         Raises:
             FieldError: a value has another type, or a key is unknown.
@@ -144,6 +146,8 @@ class Written:
         Raises:
             InputError: something does not exist, or a value is invalid.
         """
+        from antdrive.planners import load_planner, record_name
+        from antdrive.robots import load_robot
         from antdrive.sim.forms import scenario_fields
         from antdrive.sim.scenario import Scenario
 
@@ -151,13 +155,14 @@ class Written:
         with placed(at):
             fields = scenario_fields({**self.settings, **({"margin": 0.0} if auto else {})})
             fields |= {"seed": self.seed, "planner_name": record_name(self.planner), **made}
-            for name, load in (("task", self.load_task), ("planner", self.load_planner), ("robot", self.load_robot)):
-                if name not in fields:
-                    fields[name] = load(home)
+            if "task" not in made:
+                fields["task"] = self.load_task(home)
+            if "planner" not in made:
+                fields["planner"] = load_planner(self.planner, home, **self.options)
+            if "robot" not in made:
+                fields["robot"] = load_robot(self.robot, home)
             here = self if home is None else self.seen_from_here(home)
-            options = {
-                key: getattr(fields["planner"], key, value) for key, value in self.options.items()
-            }  # no longer text
+            options = {key: getattr(fields["planner"], key, value) for key, value in self.options.items()}  # not text
             here = dataclasses.replace(here, options=options)
             words = {"task": here.world, "planner": here.planner, "robot": here.robot}
             said = {name: (fields[name], here._words(name)) for name, word in words.items() if word}
@@ -171,6 +176,8 @@ class Written:
             home: base of relative paths
             at: returns the error for a key
         """
+        from antdrive.planners import load_planner
+        from antdrive.planners.user_code import is_user_code
         from antdrive.robots.robot_file import list_robots
         from antdrive.worlds.files.world_file import list_worlds
 
@@ -179,10 +186,14 @@ class Written:
                 resolve("world", self.world, list_worlds(), home)
             resolve("robot", self.robot, list_robots(), home)
             if not is_user_code(self.planner):
-                self.load_planner()
+                load_planner(self.planner, **self.options)
 
     def load_task(self, home: Path | None = None) -> Task:
-        """Load the world with start and goal; `home` is the base of relative paths."""
+        """Return the world with start and goal.
+
+        Args:
+            home: base of relative paths
+        """
         from antdrive.worlds import load_task
 
         task = load_task(self.world, self.task, home) if isinstance(self.world, str) else self._generated(self.world)
@@ -207,18 +218,6 @@ class Written:
         except InputError as error:
             raise FieldError("world", str(error)) from None
 
-    def load_planner(self, home: Path | None = None) -> Planner:
-        """Load the planner with its options; `home` is the folder of user code."""
-        from antdrive.planners import load_planner
-
-        return load_planner(self.planner, home, **self.options)
-
-    def load_robot(self, home: Path | None = None) -> RobotSpec:
-        """Load the robot; `home` is the base of relative paths."""
-        from antdrive.robots import load_robot
-
-        return load_robot(self.robot, home)
-
     def _words(self, name: str) -> dict[str, Any]:
         """Return the fields that name a scenario's task, planner or robot."""
         keys = {"task": ("world", "task", "start", "goal"), "planner": ("planner", "options"), "robot": ("robot",)}
@@ -226,7 +225,11 @@ class Written:
 
     @classmethod
     def of(cls, s: Scenario) -> Written:
-        """Return a scenario as written, else as a person would write it with files named after its parts."""
+        """Return a scenario as written; parts made in Python are files named after them.
+
+        Args:
+            s: the scenario
+        """
         from antdrive.sim.forms import written
 
         words: dict[str, Any] = {}
@@ -253,7 +256,11 @@ class Written:
         return before + shlex.join([*words, *settings, "--seed", str(self.seed)])
 
     def moved(self, rename: Callable[[str], str]) -> Written:
-        """Return the same with other names for its files."""
+        """Return the same with other names for its files.
+
+        Args:
+            rename: returns the other name
+        """
         from antdrive.robots import list_robots
         from antdrive.worlds import list_worlds
 
@@ -264,7 +271,12 @@ class Written:
         return dataclasses.replace(self, world=world, planner=planner, robot=robot)
 
     def seen_from_here(self, home: Path, *, anywhere: bool = False) -> Written:
-        """Return the same with files relative to the working directory, or with whole paths; modules beside are files."""
+        """Return the same with files relative to the working directory, and modules beside the home as files.
+
+        Args:
+            home: base of relative paths
+            anywhere: whether to write whole paths
+        """
 
         def shown(name: str) -> str:
             path, here = (home / name).resolve(), Path.cwd()
@@ -360,6 +372,8 @@ def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenar
     Raises:
         InputError: the planner or controller cannot be found by its name, or has custom settings.
     """
+    from antdrive.planners.user_code import is_user_code, record_name
+
     name = record.planner.name
     made: dict[str, Any] = {"task": record.task, "robot": record.robot, "planner_name": name}
     if isinstance(planner, str):

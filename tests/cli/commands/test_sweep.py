@@ -72,7 +72,7 @@ def test_a_campaign_is_run_once_and_then_goes_on_with_what_is_new(antdrive, camp
 
 @pytest.mark.slow
 def test_options_mean_what_a_file_means(antdrive, campaign):
-    words = ["--world", "*.yaml", "-p", "astar", "-p", "aco-han:ants=5,10"]
+    words = ["--world", "*.yaml", "-p", "astar", "-p", "aco-han", "--set", "aco-han.ants=5,10"]
     campaign.rename("campaign.txt")
     _, out, _ = antdrive("sweep", *words, "-o", "flags", "--jobs", "1", "--json")
     assert json.loads(out)["runs"] == 3
@@ -92,7 +92,21 @@ def test_what_robots_know_is_an_option(antdrive, campaign):
 @pytest.mark.slow
 def test_the_command_in_a_row_repeats_the_run(antdrive, campaign, monkeypatch):
     words = ["--tasks", "2", "--noise", "1", "--smoothing", "taut", "--margin", "0.05", "--seeds", "3,7"]
-    antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "-p", "aco-han:ants=5:shortcut=true", *words)
+    antdrive(
+        "sweep",
+        campaign,
+        "-o",
+        "out",
+        "--jobs",
+        "1",
+        "-p",
+        "aco-han",
+        "-s",
+        "planner.ants=5",
+        "-s",
+        "planner.shortcut=true",
+        *words,
+    )
     row = read_results("out").table.to_pylist()[-1]
     assert (row["planner"], row["task"], row["seed"]) == ("aco-han ants=5 shortcut=true", "random-0-1", 7)
     monkeypatch.chdir("out")
@@ -105,7 +119,9 @@ def test_the_command_in_a_row_repeats_the_run(antdrive, campaign, monkeypatch):
 def test_a_planner_in_a_file_is_swept_and_its_command_repeats_the_run(antdrive, campaign, monkeypatch):
     lines = ["from dataclasses import dataclass", "from antdrive.planners import AStar", "@dataclass(frozen=True)"]
     Path("mine.py").write_text("\n".join([*lines, "class Mine(AStar):", "    width: int = 3", ""]))
-    code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "-p", "mine.py:Mine:width=4", "--json")
+    code, out, _ = antdrive(
+        "sweep", campaign, "-o", "out", "--jobs", "1", "-p", "mine.py:Mine", "-s", "Mine.width=4", "--json"
+    )
     assert (code, json.loads(out)["succeeded"]) == (0, 1)
     (row,) = read_results("out").table.to_pylist()
     assert row["planner"] == "Mine width=4"

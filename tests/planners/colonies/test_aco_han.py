@@ -5,6 +5,7 @@ import pytest
 
 from antdrive.planners import AcoHan, Iteration, PlanStatus, PotentialFieldAnts, Progress, keep_best, on_progress
 from antdrive.planners.colonies.colony import ColonyGraph, IterationState, TourConstruction, without_loops
+from antdrive.worlds import DIRECTIONS
 from tests.planners.colonies.test_colony import DIRECT, OPEN, walks
 from tests.planners.worlds_to_solve import catalogue
 
@@ -92,12 +93,20 @@ def test_the_listing_adds_raw_pheromone_to_one_fixed_direction():
     assert weights[5, 5] == pytest.approx(3.0)  # away from the goal: the trail alone
 
 
-def test_without_loops_cuts_loops_out_of_a_walk():
-    graph = ColonyGraph.of(OPEN)
-    tours = without_loops(walks(DIRECT, ROUND), graph)
-    assert graph.cells(tours.cells[1, : tours.sizes[1]]).tolist() == [[0, 0], [0, 1], [1, 2], [2, 3]]
-    assert tours.lengths[1] == pytest.approx(1 + 2 * math.sqrt(2))
-    assert tours.sizes[0] == len(DIRECT)
+def test_each_loop_of_a_walk_is_cut_out_as_it_closes():
+    graph, rng, loops = ColonyGraph.of(OPEN), np.random.default_rng(0), 0
+    for _ in range(60):
+        walk, kept = [(0, 0)], []
+        while walk[-1] != (2, 3):
+            (r, c), (dr, dc) = walk[-1], DIRECTIONS[rng.integers(8)]
+            walk += [(r + dr, c + dc)] * (0 <= r + dr < 3 and 0 <= c + dc < 4)
+        for cell in walk:
+            kept = [*kept[: kept.index(cell)], cell] if cell in kept else [*kept, cell]
+        tours = without_loops(walks(walk), graph)
+        assert list(map(tuple, graph.cells(tours.cells[0, : tours.sizes[0]]).tolist())) == kept
+        assert tours.lengths[0] == pytest.approx(walks(kept).lengths[0])
+        loops += len(walk) - len(kept)
+    assert loops > 100
 
 
 @pytest.mark.parametrize("world", ["trap", "slalom"])

@@ -93,12 +93,6 @@ def test_without_a_memory_walks_return_to_cells_and_the_path_loses_its_loops():
     assert result.history.best[-1] == pytest.approx(result.cost)
 
 
-def test_loops_are_cut_out_of_a_walk_without_a_memory():
-    walk, tour = np.array([0, 1, 2, 1, 4, 5, 4, 8], dtype=np.int32), np.zeros(8, dtype=np.int32)
-    size = _kernels_pfaco.copy_without_loops(walk, 8, np.zeros(9, dtype=np.int64), tour)
-    assert tour[:size].tolist() == [0, 1, 4, 8]
-
-
 def test_ants_cross_a_large_map_unless_they_follow_the_letter():
     # The claim of lee2008 with a fifth of its ants; docs/papers/lee2008.md has the figures with all ants.
     query = blocks(100, 100, 25, 16, 300)

@@ -159,18 +159,6 @@ def test_only_a_robot_that_did_not_get_there_reports_what_its_guide_noted(turtle
         assert noted.with_reason(Ending(outcome, "why"), 7) == Ending(outcome, f"why{note}")
 
 
-@pytest.mark.parametrize(
-    ("outside", "outcome"), [(-0.002, Outcome.SUCCEEDED), (0.0, Outcome.SUCCEEDED), (0.002, Outcome.STUCK)]
-)
-def test_a_robot_that_stops_just_outside_the_tolerance_has_not_arrived(turtlebot, outside, outcome):
-    x, y = TASK.goal
-    away = TASK.goal_tolerance + outside
-    at_end = driver(turtlebot)
-    at(at_end, at_end.path.length)
-    endings = [end_of(at_end, tick, (x, y, 0.0), State(x - away, y, 0.0, 0.0, 0.0)) for tick in range(9)]
-    assert {ending.outcome for ending in endings if ending is not None} == {outcome}
-
-
 def test_a_mover_beside_the_goal_closes_no_cell_within_the_inflation_of_it():
     """The goal's cell and those around it stay free, wherever in its cell the goal is."""
     for x in (7.9, 8.0, 8.1):
@@ -313,16 +301,6 @@ def test_a_robot_that_brakes_for_the_goal_slows_its_turn_no_faster_than_it_can(s
     gentle = abs(yaw_rate) * jackal.max_acceleration <= abs(speed) * jackal.max_yaw_acceleration
     if gentle and speed:
         assert slower.yaw_rate * last.speed == pytest.approx(last.yaw_rate * slower.speed, abs=1e-9), "the same curve"
-
-
-def test_half_a_second_of_braking_is_logged_after_a_contact(collided_run):
-    log = collided_run.rollout
-    first = int(log.contacts[0, 0])
-    after = len(log.t) - 1 - first
-    assert 120 <= after < 120 + 240 // 60, "the control period is finished first"
-    assert not log.command[-120:].any()
-    assert log.command[-121].any()
-    assert abs(log.twist[-1, 0]) < abs(log.twist[first, 0])
 
 
 @pytest.mark.parametrize(

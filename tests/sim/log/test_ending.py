@@ -143,9 +143,9 @@ def test_a_robot_at_the_speed_limit_of_standing_moves():
 
 def test_the_estimate_ends_a_drive_and_the_pose_decides_its_outcome():
     assert arrived((1.0, 1.0), (0.0, 0.0), (0.0, 0.0), GOAL, 0.2 + 1e-12)
-    assert not arrived((1.0, 1.0), (0.0, 0.0), (0.0, 0.0), GOAL, 0.19)
+    assert not arrived((1.0, 1.0), (0.0, 0.0), (0.0, 0.0), GOAL, 0.2 - 1e-6)
     assert outcome_at(HERE, GOAL, 0.2 + 1e-12) is Outcome.SUCCEEDED
-    assert outcome_at(HERE, GOAL, 0.19) is Outcome.STUCK
+    assert outcome_at(HERE, GOAL, 0.2 - 1e-6) is Outcome.STUCK
     log = moving_until(1196)
     off = replace(log, estimate=log.pose - (0.1, 0.0, 0.0))
     assert says(off, "neither at the goal nor at the end of its route")

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from antdrive.base.plane import relative_frame, transform_points
 from antdrive.robots import load_robot
 from antdrive.robots.clearance import footprint_clearance
-from antdrive.sim import METRICS
 from antdrive.sim.log.rollout import millimetres, ranges_of
-from antdrive.sim.log.sights import PASSED, first_meetings, mover_sightings, passed, seen_ground, sightings
+from antdrive.sim.log.sights import PASSED, first_meetings, mover_sightings, passed, sightings
 from antdrive.worlds import Disc, World
 from tests.made_up_drive import scanned
 from tests.records import changed
@@ -37,23 +36,6 @@ def visible(log, k, points, *others):
         share = np.clip((to @ (cx - x, cy - y)) / away**2, 0.0, 1.0)
         seen &= np.hypot(x + share * to[:, 0] - cx, y + share * to[:, 1] - cy) > radius
     return seen
-
-
-def test_ground_is_seen_where_nothing_stands_between(log):
-    seen, cell = seen_ground(log)
-    assert cell == 0.1
-    assert seen.shape == (40, 60)
-    middles = np.stack(np.meshgrid((np.arange(60) + 0.5) * cell, (np.arange(40) + 0.5) * cell), axis=2).reshape(-1, 2)
-    expected = np.any([visible(log, k, middles) for k in range(len(log.scans))], axis=0).reshape(40, 60)
-    assert (seen != expected).mean() < 0.02  # cells at the edges of shadows, between two beams
-    assert 0.5 < expected.mean() < 0.95
-    assert METRICS["explored_m2"](log) == pytest.approx(seen.sum() * 0.01)
-
-
-def test_a_lidar_that_sees_less_far_explores_less(log, made_up_drive):
-    near = scanned(made_up_drive(size=(6.0, 4.0), obstacles=40), max_range=1.0)
-    assert METRICS["explored_m2"](near) < 0.8 * METRICS["explored_m2"](log)
-    assert math.isnan(METRICS["explored_m2"](made_up_drive()))
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])

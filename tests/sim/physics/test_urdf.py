@@ -101,20 +101,6 @@ def test_no_robot_is_larger_in_physics_than_its_footprint(robot):
     assert reach(robot) <= 1e-9 * robot.radius
 
 
-def test_a_robot_with_its_back_at_a_wall_has_no_part_in_the_wall():
-    """The case that was certified with a caster 11 mm inside the wall."""
-    world = World("room", (0, 0, 6, 4), (Disc(5, 3, 0.2),))
-    jackal = load_robot("jackal")
-    with Engine(world, jackal) as engine:
-        engine.place((0.258, 2, 0))
-        assert engine.contacts() == []
-        p, body, client = engine._p, engine._robot, engine._client
-        for link in range(4):
-            (shape,) = p.getCollisionShapeData(body, link, physicsClientId=client)
-            x = p.getLinkState(body, link, physicsClientId=client)[0][0]
-            assert x - shape[3][0] > 0
-
-
 @pytest.mark.parametrize("gap", [0.6, 0.02])  # metres beyond the wheels: spheres of their size, and small ones
 def test_small_spheres_roll_like_wheels(gap):
     """Speed on the floor and torque are those of the wheel, whatever the size of the sphere that stands for it."""

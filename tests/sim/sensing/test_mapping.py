@@ -210,6 +210,10 @@ def test_a_map_grows_and_keeps_what_it_holds():
     assert small.seen_free.sum() == laid_out.seen_free.sum() == large.seen_free.sum()
     discs = [grid.discs()[np.lexsort(grid.discs().T)] for grid in (small, laid_out, large)]
     np.testing.assert_allclose(discs[:2], [discs[2]] * 2, atol=1e-6)
+    cells = [
+        np.argwhere(grid.occupied) + np.round(np.divide(grid.origin[::-1], 0.05)) for grid in (small, laid_out, large)
+    ]
+    assert cells[0].tolist() == cells[1].tolist() == cells[2].tolist()
 
 
 def test_nothing_is_entered_beyond_fixed_bounds():

@@ -18,7 +18,7 @@ from antdrive.cli.entrants import check_worlds, entrants_of
 from antdrive.cli.exits import FAILED, SUCCEEDED
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives, print_faults, print_idle_settings, results_folder
-from antdrive.cli.scenario_options import Ends, Setup
+from antdrive.cli.scenario_options import Ends
 from antdrive.runs.comparing import PLANNER_FAULT, compare_scenarios
 from antdrive.runs.results_folder import mark_of
 from antdrive.sim.settings import COMPARED_SMOOTHING
@@ -79,28 +79,24 @@ def compare(
         return SUCCEEDED
     require_physics()
     check_worlds(worlds)
-    entrants = entrants_of(planner, settings)
-    tasks = {world: ends.of(world) for world in worlds}
-    scenarios = {
-        (world, entrant): Setup(entrant.name, list(entrant.settings), robot).scenario(tasks[world], given)
-        for world in worlds
-        for entrant in entrants
-    }
-    names = {world: scenario.task.world.name for (world, _), scenario in scenarios.items()}
-    if len(set(names.values())) < len(worlds):
+    places = [ends.of(world) for world in worlds]
+    entrants = entrants_of(planner, settings, robot)
+    scenarios = {label: [setup.scenario(place, given) for place in places] for label, setup in entrants.items()}
+    every = [scenario for several in scenarios.values() for scenario in several]
+    names = list(dict.fromkeys(scenario.task.world.name for scenario in every))
+    if len(names) < len(worlds):
         raise InputError(f"{' '.join(worlds)}: world names must be unique")
     if film is not None:
         check_film(film)
     elif prelude:
         raise InputError("--prelude: needs --film")
-    if prelude and not any(capabilities_of(scenario.planner).iterative for scenario in scenarios.values()):
+    if prelude and not any(capabilities_of(scenario.planner).iterative for scenario in every):
         raise InputError("--prelude: needs an iterative planner; none of these is one")
-    print_idle_settings(list(scenarios.values()), {"seed"} if seeds > 1 else ())
+    print_idle_settings(every, {"seed"} if seeds > 1 else ())
     numbers = range(given["seed"], given["seed"] + seeds)
-    cases = [(names[world], number) for world in worlds for number in numbers]
-    keys = [(entrant.label, world, scenario.key) for (world, entrant), scenario in scenarios.items()]
-    mark = mark_of(keys, cases)
-    usual = Path("out") / file_name(f"compare-{'-'.join(names.values())}"[:100])
+    cases = [(name, number) for name in names for number in numbers]
+    mark = mark_of([*entrants], worlds, [scenario.key for scenario in every], cases)
+    usual = Path("out") / file_name(f"compare-{'-'.join(names)}"[:100])
     with results_folder(out, usual, MARKER, mark, write_manifest=False) as (folder, facts):
 
         def attempt(label: str, scenario: "Scenario") -> "tuple[Run | PlannerError, str | None]":
@@ -122,8 +118,7 @@ def compare(
             write_run(result, part, command, figures=figures and case == cases[0])
             return result, str(part)
 
-        by_label = {entrant.label: [scenarios[world, entrant] for world in worlds] for entrant in entrants}
-        compared = compare_scenarios(by_label, numbers, attempt)
+        compared = compare_scenarios(scenarios, numbers, attempt)
         first = compared.runs[: len(entrants)]
         folders = {run.label: run.facts["folder"] for run in first if run.facts["folder"]}
         files = folders if len(cases) == 1 else {"folder": str(folder)}

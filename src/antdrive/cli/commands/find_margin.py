@@ -46,8 +46,7 @@ def find_margin(
     if max_speed is not None:
         slowed = dataclasses.replace(base.robot, max_speed=min(max_speed, base.robot.max_speed))
         base = dataclasses.replace(base, robot=slowed)
-    numbers = range(first, first + seeds)
-    tasks = {seed: base.task if kind is None else generated(kind, seed, ()) for seed in numbers}
+    tasks = {seed: base.task if kind is None else generated(kind, seed, ()) for seed in range(first, first + seeds)}
 
     def drive_with(margin: float, seed: int) -> "Run":
         return drive(dataclasses.replace(base, task=tasks[seed], margin=margin, seed=seed))

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from antdrive.base.checks import pair
 from antdrive.base.errors import InputError
 from antdrive.base.files import summary_of
 from antdrive.base.tables import file_lines
@@ -12,7 +13,7 @@ from antdrive.cli import options
 from antdrive.cli.console import show
 from antdrive.cli.listings import Row, robot_lines
 from antdrive.cli.options import argument, flag, option
-from antdrive.cli.parse import import_target, numbers, pair, xacro
+from antdrive.cli.parse import import_target, numbers, xacro
 
 if TYPE_CHECKING:
     from antdrive.robots import RobotSpec

@@ -26,10 +26,14 @@ def sweep(
     generate: Annotated[
         list[str] | None, option("KIND:SEEDS", "Random worlds: forest:20 or barn:0-9. Repeatable.")
     ] = None,
-    planner: Annotated[
+    planner: Annotated[list[str] | None, option("NAME", "Planner name or FILE.py:CLASS. Repeatable.")] = None,
+    settings: Annotated[
         list[str] | None,
         option(
-            "NAME", "Planner or FILE.py:CLASS; options follow a colon: as:ants=10,50 or as:ants=10..50..20. Repeatable."
+            "GROUP.KEY=VALUES",
+            "Options of a planner (as.ants=10,50 or as.ants=10..50..20) or of all (planner.ants=50). Repeatable.",
+            "--set",
+            "-s",
         ),
     ] = None,
     robot: Annotated[list[str] | None, option("NAME", "Robot name or file. Repeatable.")] = None,
@@ -80,8 +84,8 @@ def sweep(
         raise InputError("--out: missing; name the output folder")
     _check(keep, dask, jobs, report, dry_run)
     requested = campaign_from(
-        campaign, given, worlds=world, generate=generate, planners=planner, robots=robot, seeds=seeds, tasks=tasks,
-        run_limit=run_limit,
+        campaign, given, worlds=world, generate=generate, planners=planner, options=settings, robots=robot, seeds=seeds,
+        tasks=tasks, run_limit=run_limit,
     )  # fmt: skip
     expansion = expand(requested)
     rest: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}

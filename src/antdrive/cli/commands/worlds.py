@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from antdrive.base.checks import pair
 from antdrive.base.errors import InputError
 from antdrive.base.files import summary_of
 from antdrive.base.tables import file_lines
@@ -11,7 +12,7 @@ from antdrive.cli import options
 from antdrive.cli.console import bar, show, stage
 from antdrive.cli.listings import Row, world_lines
 from antdrive.cli.options import argument, flag, option
-from antdrive.cli.parse import import_target, numbers, pair, pose
+from antdrive.cli.parse import import_target, numbers, pose
 from antdrive.cli.scenario_options import Ends
 
 if TYPE_CHECKING:

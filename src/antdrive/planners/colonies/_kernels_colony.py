@@ -205,25 +205,29 @@ def summarise(lengths: Array) -> tuple[int, float, int]:
 
 
 @kernel
+def copy_without_loops(walk: Array, size: int, last: Array, tour: Array) -> int:
+    """Write the walk without loops to `tour`, continuing from the last visit of each cell; returns the tour's size.
+
+    `last` (cells,) is working memory.
+    """
+    for s in range(size):
+        last[walk[s]] = s
+    s, n = 0, 0
+    while s < size:
+        tour[n] = walk[s]
+        n += 1
+        s = last[walk[s]] + 1
+    return n
+
+
+@kernel
 def cut_loops(
     walks: Array, sizes: Array, mask: Array, to: Array, tours: Array, tour_sizes: Array, lengths: Array
 ) -> None:
-    """Write walk a without loops to row a of `tours`: cells between two visits of a cell are dropped."""
-    place = np.full(len(mask), -1, dtype=np.int32)
+    """Write walk a without loops to row a of `tours`."""
+    last = np.empty(len(mask), dtype=np.int64)
     for a in range(len(sizes)):
-        n = 0
-        for s in range(sizes[a]):
-            i = walks[a, s]
-            if place[i] >= 0:
-                while n > place[i] + 1:
-                    n -= 1
-                    place[tours[a, n]] = -1
-            else:
-                tours[a, n] = i
-                place[i] = n
-                n += 1
-        for s in range(n):
-            place[tours[a, s]] = -1
+        n = copy_without_loops(walks[a], sizes[a], last, tours[a])
         tour_sizes[a] = n
         lengths[a] = walk_length(tours[a], n, to) if n else np.inf
 

@@ -7,7 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from antdrive.planners.colonies._kernels_colony import after, cut_one_short, next_random, step_length, walk_length
+from antdrive.planners.colonies._kernels_colony import (
+    after,
+    copy_without_loops,
+    cut_one_short,
+    next_random,
+    step_length,
+    walk_length,
+)
 from antdrive.worlds._kernels import SQRT2, Array, inline, kernel
 
 LISTED, ENTRIES = 0, 1  # indices of `Ranking.counts`
@@ -212,22 +219,6 @@ def cut_walk_short(ant: int, ants: Ants, graph: Graph, first: int, place: Array,
         walk[s] = tour[s]
     ants.sizes[ant] = size
     ants.lengths[ant] = walk_length(tour, size, graph.to)
-
-
-@kernel
-def copy_without_loops(walk: Array, size: int, last: Array, tour: Array) -> int:
-    """Write the walk without loops to `tour`, continuing from the last visit of each cell; returns the tour's size.
-
-    `last` (cells,) is working memory.
-    """
-    for s in range(size):
-        last[walk[s]] = s
-    s, n = 0, 0
-    while s < size:
-        tour[n] = walk[s]
-        n += 1
-        s = last[walk[s]] + 1
-    return n
 
 
 @kernel

@@ -26,6 +26,7 @@ from antdrive.sim.forms import (
     written_kind,
 )
 from antdrive.sim.settings import COMPARED_SMOOTHING, SETTINGS
+from antdrive.sim.written import ErrorAt
 
 MOST_SEEDS = 1_000_000  # as a count
 
@@ -234,6 +235,15 @@ class Campaign:
             problem: the error and the fix
         """
         return self.document.error(location, problem)
+
+    def at(self, *location: str | int, skip: int = 0) -> ErrorAt:
+        """Return what gives the errors of a value their places.
+
+        Args:
+            location: path to the value
+            skip: number of leading parts of their keys that the location has already
+        """
+        return lambda key, problem: self.error((*location, *key.split(".")[skip:]), problem)
 
 
 def load_campaign(path: str | os.PathLike[str]) -> Campaign:

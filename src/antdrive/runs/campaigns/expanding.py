@@ -22,7 +22,7 @@ from antdrive.sim.effects import idle_notes
 from antdrive.sim.forms import scenario_fields
 from antdrive.sim.log.record import canonical_hash
 from antdrive.sim.scenario import Scenario, key_of
-from antdrive.sim.written import Written, unchosen
+from antdrive.sim.written import Written, placed, unchosen
 from antdrive.worlds import Task
 from antdrive.worlds.formats.map_server import OF_SHADE
 
@@ -138,10 +138,8 @@ def _robots(campaign: Campaign) -> list[NamedRobot]:
     """Return the robots of a campaign, each once."""
     known, robots = list_robots(), dict[str, NamedRobot]()
     for i, name in enumerate(campaign.entry.robots):
-        try:
+        with placed(campaign.at("robots", i, skip=1)):
             path = resolve("robot", name, known, campaign.folder)
-        except FieldError as error:
-            raise campaign.error(("robots", i), error.problem) from None
         robot = load_robot(path)
         content = canonical_hash(robot)
         word = name if name in known else f"{ROBOTS}/{content[:8]}/{path.name}"
@@ -163,10 +161,8 @@ def _settings(campaign: Campaign) -> list[tuple[dict[str, Any], Location]]:
     combinations = []
     for *values, (settings, place) in itertools.product(*map(campaign.values, AXES), listed):
         given = {**settings, **dict(zip(keys, values, strict=True))}
-        try:
+        with placed(campaign.at(*place)):
             scenario_fields(given)
-        except FieldError as error:
-            raise campaign.error((*place, *error.key.split(".")), error.problem) from None
         combinations.append((given, place))
     return combinations
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from antdrive.base.checks import grouped
 from antdrive.base.errors import InputError
+from antdrive.planners.user_code import record_name
 from antdrive.robots import list_robots
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.sim.settings import SETTINGS
@@ -57,7 +58,7 @@ def _keys(words: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     keys |= {
         "robots": words["robots"],
         "worlds": [*(words["worlds"] or ()), *(_generated(text) for text in words["generate"] or ())],
-        "planners": [_planner(text) for text in words["planners"] or ()],
+        "planners": _planners(words["planners"] or (), words["options"] or ()),
         "settings": {key: value for key, value in settings.items() if key not in axes},
         "seeds": None if words["seeds"] is None else _seeds(words["seeds"]),
         "run_limit": words["run_limit"],
@@ -104,26 +105,21 @@ def _generated(text: str) -> dict[str, Any]:
     return {"generate": kind, "seeds": _seeds(seeds) if seeds else 1}
 
 
-def _planner(text: str) -> Any:
-    """Parse NAME or NAME:KEY=VALUES:KEY=VALUES, where VALUES are 10,50 or 10..50..20.
-
-    NAME may be FILE.py:CLASS or MODULE:CLASS.
-    """
-    file = re.match(r".+?\.py(?=:|$)", text)  # with a drive's colon on Windows
-    name, *options = [file[0], *text[file.end() :].split(":")[1:]] if file else text.split(":")
-    if options and "=" not in options[0] and (file or "." in name):
-        name += f":{options.pop(0)}"
-    entry: dict[str, Any] = {"name": name}
-    for option in options:
-        key, mark, values = option.partition("=")
-        if not mark or not key:
-            raise InputError(f"--planner {text}: must be NAME:KEY=VALUE, such as aco-han:ants=10,50")
+def _planners(names: Sequence[str], settings: Sequence[str]) -> list[Any]:
+    """Parse the campaign key `planners` from names and `--set NAME.KEY=VALUES`, where VALUES are 10,50 or 10..50..20."""
+    if settings and not names:
+        raise InputError(f"--set {settings[0]}: needs --planner")
+    options: dict[str, dict[str, Any]] = {name: {} for name in names}
+    for text in settings:
+        group, key, values = grouped(text, (*map(record_name, names), "planner"))
         ends = values.split("..")
+        given: Any = values.split(",") if "," in values else values
         if len(ends) == 3:
-            entry[key] = dict(zip(("from", "to", "step"), (_number("--planner", end) for end in ends), strict=True))
-        else:
-            entry[key] = values.split(",") if "," in values else values
-    return entry if options else name
+            given = dict(zip(("from", "to", "step"), (_number(f"--set {text}", end) for end in ends), strict=True))
+        for name in names:
+            if group in ("planner", record_name(name)):
+                options[name][key] = given
+    return [{"name": name, **given} if given else name for name, given in options.items()]
 
 
 def _number(option: str, text: str, *, whole: bool = False) -> float | int:

@@ -26,10 +26,10 @@ from antdrive.runs.campaigns.job import NamedTask, PlannerVariant, TaskOrigin
 from antdrive.sim.driving.routes import FINE
 from antdrive.sim.forms import option_text, seed_list
 from antdrive.sim.log.record import canonical_hash, settings_of
+from antdrive.sim.written import Written, placed
 from antdrive.worlds import Disc, Grid, Task, World, list_worlds, load_task, load_tasks, rasterise
 from antdrive.worlds.coverage import reached_cells, share_of
 from antdrive.worlds.formats.importing import import_file, import_format
-from antdrive.worlds.generators.generate import generated
 
 OWN = "own"  # name of a world's default task
 SKIP = "with skip: true such problems are skipped"
@@ -98,8 +98,7 @@ def _files(campaign: Campaign, place: Location, pattern: str, otherwise: str) ->
 
 
 def _random(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Iterator[tuple[NamedTask, str]]:
-    kind = entry.pop("generate")
-    if not isinstance(kind, str):
+    if not isinstance(kind := entry["generate"], str):
         raise campaign.error((*place, "generate"), f"must be the name of a generator, got {show(kind)}")
     if "seed" in entry and "seeds" in entry:
         raise campaign.error((*place, "seed"), "use either seed or seeds")
@@ -109,13 +108,10 @@ def _random(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Itera
         seeds = seeds_of([given] if key == "seed" else given)
     except ValueError as error:
         raise campaign.error((*place, key), str(error)) from None
-    options = tuple((name, option_text(value)) for name, value in entry.items())
-    suffix = "".join(f" {name}={text}" for name, text in options)
+    suffix = "".join(f" {name}={option_text(value)}" for name, value in entry.items() if name != "generate")
     for seed in seeds:
-        try:
-            task = generated(kind, seed, options)
-        except InputError as error:
-            raise campaign.error(place, str(error)) from None
+        with placed(campaign.at(*place, skip=1)):
+            task = Written(world={**entry, "seed": seed}).load_task()
         yield NamedTask(f"{kind}-{seed}{suffix}", OWN, task, None, place), f"{kind}-{seed}{suffix} ({place[1]})"
 
 
@@ -193,29 +189,19 @@ def _variants(campaign: Campaign, place: Location, options: dict[str, Any]) -> I
     path = (campaign.folder / file).absolute() if file.endswith(".py") else None
     source = given_name if path is None else f"{path}:{inner}"
     name = given_name if path is None else f"{path.name}:{inner}"
-    try:
+
+    at = campaign.at(*place, skip=1)
+    with placed(at):
         version = planner_version(source)
-    except InputError as error:
-        raise _at_option(campaign, place, str(error)) from None
     word = name if path is None else f"{PLANNER_FILES}/{version.rpartition(' ')[2]}/{name}"
     lists = [values_of(campaign, (*place, key), value) for key, value in options.items()]
     for values in itertools.product(*lists):
         given = dict(zip(options, values, strict=True))
-        try:
+        with placed(at):
             planner = load_planner(source, **given)
-        except InputError as error:
-            raise _at_option(campaign, place, str(error)) from None
         resolved = settings_of(planner) if dataclasses.is_dataclass(planner) else settings_of(given)
         label = " ".join([name, *(f"{key}={option_text(value)}" for key, value in given.items())])
         yield PlannerVariant(label, name, source, word, path, version, given, resolved)
-
-
-def _at_option(campaign: Campaign, place: Location, text: str) -> InputError:
-    """Move the error of `load_planner` to the option that it names."""
-    key, mark, problem = text.partition(": ")
-    if mark and key.startswith("planner."):
-        return campaign.error((*place, key.removeprefix("planner.")), problem)
-    return campaign.error(place, text.removeprefix("planner: "))
 
 
 def values_of(campaign: Campaign, place: Location, value: Any) -> list[Any]:

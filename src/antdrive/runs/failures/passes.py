@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -94,8 +94,7 @@ def seed(scenario: Scenario, runner: CandidateRunner) -> Scenario:
 
 def time_limit(scenario: Scenario, runner: CandidateRunner) -> Scenario:
     """Drop the scenario's own time limit."""
-    task = dataclasses.replace(scenario.task, time_limit=None)
-    free = _varied(scenario, time_limit=None, task=task)
+    free = _varied(scenario, time_limit=None, task={"time_limit": None})
     return scenario if free == scenario else runner.first([free]) or scenario
 
 
@@ -136,18 +135,17 @@ PASSES: tuple[tuple[str, Callable[[Scenario, CandidateRunner], Scenario]], ...] 
 
 def with_obstacles(scenario: Scenario, discs: Sequence[Disc]) -> Scenario | None:
     """Return the scenario with other obstacles; None if it is invalid."""
-    return _varied_world(scenario, obstacles=tuple(discs))
+    return _varied(scenario, world={"obstacles": tuple(discs)})
 
 
 def with_movers(scenario: Scenario, kept: Sequence[Mover]) -> Scenario | None:
     """Return the scenario with other movers; None if it is invalid."""
-    return _varied_world(scenario, movers=tuple(kept))
+    return _varied(scenario, world={"movers": tuple(kept)})
 
 
 def with_unseen(scenario: Scenario, discs: Sequence[Disc], **world: Any) -> Scenario | None:
     """Return the scenario with other unseen obstacles and changed fields of its world; None if it is invalid."""
-    fewer = _varied(scenario, unseen=tuple(discs))
-    return fewer if fewer is None or not world else _varied_world(fewer, **world)
+    return _varied(scenario, unseen=tuple(discs), world=world)
 
 
 def _needed(
@@ -227,7 +225,7 @@ def _nearer_starts(scenario: Scenario, rollout: Rollout | None) -> Iterator[Scen
         row = _failing_row(rollout) - round(before * rollout.record.physics_hz)
         if row > 0:
             x, y, yaw = rollout.pose[row].tolist()
-            yield _varied_task(scenario, start=(round(x, 2), round(y, 2), round(yaw, 2)))
+            yield _varied(scenario, task={"start": (round(x, 2), round(y, 2), round(yaw, 2))})
 
 
 def _nearer_goals(scenario: Scenario, rollout: Rollout | None) -> Iterator[Scenario | None]:
@@ -239,7 +237,7 @@ def _nearer_goals(scenario: Scenario, rollout: Rollout | None) -> Iterator[Scena
     for distance in BEYOND:
         if distance < along[-1] - 0.1:
             x, y = (round(float(np.interp(distance, along, rest[:, k])), 2) for k in (0, 1))
-            yield _varied_task(scenario, goal=(x, y))
+            yield _varied(scenario, task={"goal": (x, y)})
 
 
 def _tighter(scenario: Scenario, side: int) -> Iterator[Bounds]:
@@ -282,7 +280,7 @@ def _all_rounded(scenario: Scenario, count: int) -> Scenario | None:
 def _ends_rounded(scenario: Scenario, count: int) -> Scenario | None:
     (x, y, yaw), (gx, gy) = scenario.task.start, scenario.task.goal
     start_pose = (round(x, count), round(y, count), round(yaw, max(count, 1)))
-    return _varied_task(scenario, start=start_pose, goal=(round(gx, count), round(gy, count)))
+    return _varied(scenario, task={"start": start_pose, "goal": (round(gx, count), round(gy, count))})
 
 
 def _disc_rounded(index: int) -> Callable[[Scenario, int], Scenario | None]:
@@ -303,24 +301,15 @@ def _roundings(scenario: Scenario) -> list[Callable[[Scenario, int], Scenario | 
     return [_ends_rounded, *map(_disc_rounded, range(len(scenario.task.world.obstacles)))]
 
 
-def _varied_world(scenario: Scenario, **changes: Any) -> Scenario | None:
-    """Return the scenario with changed fields of its world; None if it is invalid."""
+def _varied(
+    scenario: Scenario, *, task: Mapping[str, Any] | None = None, world: Mapping[str, Any] | None = None, **changes: Any
+) -> Scenario | None:
+    """Return the scenario with changed fields of its own, of its task and of its world; None if it is invalid."""
     try:
-        world = dataclasses.replace(scenario.task.world, **changes)
-    except FieldError:
-        return None
-    return _varied_task(scenario, world=world)
-
-
-def _varied_task(scenario: Scenario, **changes: Any) -> Scenario | None:
-    try:
-        return _varied(scenario, task=dataclasses.replace(scenario.task, **changes))
-    except FieldError:
-        return None
-
-
-def _varied(scenario: Scenario, **changes: Any) -> Scenario | None:
-    try:
+        if world:
+            task = {**(task or {}), "world": dataclasses.replace(scenario.task.world, **world)}
+        if task:
+            changes["task"] = dataclasses.replace(scenario.task, **task)
         return dataclasses.replace(scenario, **changes)
     except FieldError:
         return None

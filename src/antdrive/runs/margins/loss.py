@@ -19,7 +19,6 @@ from antdrive.planners import PLANNERS, Query, smooth
 from antdrive.robots import RobotSpec, outline_of
 from antdrive.sim.driving.drive import follow
 from antdrive.sim.driving.localising import localiser_of
-from antdrive.sim.driving.plants import Drive
 from antdrive.sim.log.certificate import travel_between
 from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.outcome import Outcome
@@ -160,11 +159,6 @@ def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
     if log.outcome is not Outcome.SUCCEEDED or log.physics:
         return Loss(math.inf, math.inf)
     disc = log.clearance if c.outlined else point_clearance(task.world, log.pose[:, :2]) - robot.radius
-    return Loss(*(margin - least_bound(log, robot.radius, clearance) for clearance in (log.clearance, disc)))
-
-
-def least_bound(log: Drive, radius: float, clearance: Floats) -> float:
-    """Return the certain clearance from static obstacles at and between all rows of a drive [m]."""
-    travel = travel_between(log.t, log.pose, log.twist, radius)
-    between = (clearance[:-1] + clearance[1:] - travel) / 2
-    return float(between.min(initial=clearance.min()))
+    travel = travel_between(log.t, log.pose, log.twist, robot.radius)
+    between = (((room[:-1] + room[1:] - travel) / 2).min(initial=room.min()) for room in (log.clearance, disc))
+    return Loss(*(margin - float(bound) for bound in between))

@@ -10,7 +10,6 @@ import dataclasses
 import hashlib
 import json
 import math
-import re
 import typing
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,8 +22,8 @@ import numpy as np
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from antdrive.base.document import MAX_DEPTH
-from antdrive.base.errors import FieldError
-from antdrive.base.files import parse_json
+from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import json_value, parse_json
 from antdrive.base.records import STRICT, attributes_of
 from antdrive.base.types import Point
 from antdrive.robots.spec import Odometry, RobotSpec
@@ -294,8 +293,7 @@ class DriveRecord:
         asked_cell: side of the cells that were asked for [m]; omitted where plans use these
         physics: which body of physics was not in the place of its obstacle, so that its contacts are no evidence; omitted
             where all were
-        written: the scenario as a person wrote it, with the keys of a suite; not covered by the digest; omitted in logs of
-            versions before
+        written: the scenario in the keys of a suite, for commands; not covered by the digest; omitted in older logs
         digest: SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
 
     Raises:
@@ -522,15 +520,7 @@ def plain_value(value: Any) -> Any:
 
 def settings_of(values: Any) -> dict[str, Any]:
     """Convert settings to plain values, with null for an infinite number, which means "no limit"."""
-
-    def finite(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {key: finite(inner) for key, inner in value.items()}
-        if isinstance(value, list):
-            return [finite(inner) for inner in value]
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    plain = finite(plain_value(values))
+    plain = json_value(plain_value(values))
     assert isinstance(plain, dict)
     return plain
 
@@ -588,10 +578,9 @@ def _field_error(fault: ErrorDetails) -> FieldError:
     error = fault["ctx"]["error"]
     if isinstance(error, FieldError):
         return error.under(key)
-    # The text of a world file's error begins with the file's name, here the key itself, often followed by a key in the file.
-    text = str(error).removeprefix("task: ")
-    inner = re.match(r"(\w[\w.\[\]]*): (.*)", text)
-    return FieldError(f"{key}.{inner[1]}", inner[2]) if inner else FieldError(key, text)
+    if isinstance(error, InputError):  # of a world
+        return FieldError(error.within, error.problem).under(key)
+    return FieldError(key, str(error))
 
 
 def _shown(value: Any) -> str:

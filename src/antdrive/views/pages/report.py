@@ -7,6 +7,7 @@ Markdown lists failures first and stays below 60 kB.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import os
 import shlex
@@ -99,12 +100,12 @@ class Report:
         """Return the report of a campaign in a folder."""
         return cls(summary.title, summary.table, folder, summary)
 
-    @property
+    @functools.cached_property
     def planners(self) -> tuple[str, ...]:
         """The planners' labels."""
         return self.summary.paired.planners if self.summary else tuple(sorted(set(self.table.texts("planner"))))
 
-    @property
+    @functools.cached_property
     def styles(self) -> list[LabelStyle]:
         """The styles of the planners."""
         from antdrive.views.colours import label_styles
@@ -112,14 +113,14 @@ class Report:
         names = dict(zip(self.table.texts("planner"), self.table.texts("planner_name"), strict=True))
         return label_styles(self.planners, [record_name(names[label]) or label for label in self.planners])
 
-    @property
+    @functools.cached_property
     def differing(self) -> list[str]:
         """Columns of settings and options that differ between runs."""
         axes = [name for name in ("folder", "task", *self.table.settings) if name not in HASHES]
         options = [name for name in self.table.columns if name.startswith("option.")]
         return [name for name in axes if len(set(self.table.columns.get(name, [None]))) > 1] + options
 
-    @property
+    @functools.cached_property
     def shown(self) -> list[str]:
         """Columns that the table of runs shows."""
         names = ("world", "planner", *self.differing, "outcome", "test", "seed", *MEASURED)
@@ -287,16 +288,15 @@ def write_run_figures(folders: Iterable[Path], out: Path) -> list[Path]:
 
 def _markdown(report: Report, columns: Sequence[str]) -> str:
     """Return the Markdown; sections and rows of runs beyond the size limit are only counted."""
-    ordered = sorted(range(len(report.table)), key=lambda k: bool(report.table.success[k]))
+    success = report.table.success
+    ordered = sorted(range(len(success)), key=lambda k: bool(success[k]))
     rows, details = (min(len(report.runs), most) for most in (MOST_ROWS, MOST_DETAILS))
-    failures = [] if report.runs else [k for k in ordered if not report.table.success[k]]
-    facts = {name: report.table.texts(name) for name in ("world", "planner", "seed", "outcome", "reason")}
-    facts["command"] = [command or "" for command in _own_commands(report.table)] if failures else facts["reason"]
-    content = {
-        **_common(report),
-        "failures": [{name: texts[k] for name, texts in facts.items()} for k in failures[:MARKDOWN_FAILURES]],
-        "failed": len(failures),
-    }
+    failures, outcomes = [] if report.runs else [k for k in ordered if not success[k]], report.table.texts("outcome")
+    listed = report.table.take(failures[:MARKDOWN_FAILURES])
+    facts = {name: listed.texts(name) for name in ("world", "planner", "seed", "outcome", "reason")}
+    facts["command"] = [command or "" for command in _own_commands(listed)]
+    told = [dict(zip(facts, values, strict=True)) for values in zip(*facts.values(), strict=True)]
+    content = {**_common(report), "failures": told, "failed": len(failures)}
     tables = chosen_tables(all_cells(report.summary), columns) if report.summary else []
     while True:
         text = rendered(
@@ -305,7 +305,7 @@ def _markdown(report: Report, columns: Sequence[str]) -> str:
             tables=[*tables, *([_text_table(report, ordered[:rows])] if rows else [])],
             words=(*WORDS, *(measure_title(name) for name in report.shown if report.table.worded(name))),
             most=max(rows, MARKDOWN_ROWS),
-            uncounted=outcome_counts([facts["outcome"][k] for k in ordered[rows:]]) if report.runs else "",
+            uncounted=outcome_counts([outcomes[k] for k in ordered[rows:]]) if report.runs else "",
             detailed=[report.runs[k] for k in ordered[:details]],
             undetailed=len(report.runs) - details,
         )
