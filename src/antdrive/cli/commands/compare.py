@@ -70,7 +70,7 @@ def compare(
     show the first pair. Exit code 0: every run succeeded.
     Campaign folders of `antdrive sweep`: prints success rates with intervals, outcomes, and a test of every pair.
     """
-    from antdrive.planners import PlannerError, capabilities_of
+    from antdrive.planners import PlannerError
     from antdrive.sim.pipeline import run
     from antdrive.sim.written import Written
 
@@ -86,12 +86,7 @@ def compare(
     names = list(dict.fromkeys(scenario.task.world.name for scenario in every))
     if len(names) < len(worlds):
         raise InputError(f"{' '.join(worlds)}: world names must be unique")
-    if film is not None:
-        check_film(film)
-    elif prelude:
-        raise InputError("--prelude: needs --film")
-    if prelude and not any(capabilities_of(scenario.planner).iterative for scenario in every):
-        raise InputError("--prelude: needs an iterative planner; none of these is one")
+    check_film(film, prelude, every)
     print_idle_settings(every, {"seed"} if seeds > 1 else ())
     numbers = range(given["seed"], given["seed"] + seeds)
     cases = [(name, number) for name in names for number in numbers]
