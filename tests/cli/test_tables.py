@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.base.tables import LEAST_WRAPPED, table
+from antdrive.base.tables import BAD, GOOD, LEAST_WRAPPED, marked, table
 from antdrive.cli import console
-from antdrive.cli.console import BAD, GOOD, marked, print_line
+from antdrive.cli.console import print_line
 from antdrive.runs.barn_challenge import HEADS, PUBLISHED, PUBLISHED_HEADS, BarnLine
 from antdrive.runs.campaigns.results import MEDIANS
 from antdrive.runs.comparing import COMPARED, Comparison

@@ -1,12 +1,13 @@
-"""Tables of text that fit the terminal."""
+"""Tables of text that fit the terminal, signs of success, and lists of files."""
 
 from __future__ import annotations
 
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+GOOD, BAD = "✓", "✗"  # signs of success and failure
 LEAST_WRAPPED = 24  # least width of a wrapped column [characters]
 
 
@@ -62,3 +63,14 @@ def _blocks(heads: Sequence[str], rows: Iterable[Sequence[str]], columns: int) -
 
 def _words(text: str, width: int) -> list[str]:
     return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False) or [""]
+
+
+def marked(good: bool, text: str) -> str:
+    """Return a text, on a terminal with the sign of success or failure before it; the command line colours the sign."""
+    return f"{GOOD if good else BAD} {text}" if sys.stdout.isatty() else text
+
+
+def file_lines(files: Mapping[str, object]) -> Iterator[str]:
+    """Return one line per written file: name and path."""
+    width = max([8, *map(len, files)])
+    return (f"  {name:{width}} {path}" for name, path in files.items())

@@ -44,10 +44,7 @@ class CampaignQuery:
     ] = None
     where: Annotated[
         list[str] | None,
-        option(
-            "COLUMN=VALUE",
-            "Campaign: select runs, such as noise=1, noise=0,1 or duration_s=10..20. Repeatable.",
-        ),
+        option("COLUMN=VALUE", "Campaign: select runs, such as noise=1, noise=0,1 or duration_s=10..20. Repeatable."),
     ] = None
 
     @property

@@ -9,15 +9,15 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
 from antdrive.base.errors import visible
+from antdrive.base.tables import BAD, GOOD
 from antdrive.cli.commands import DEBUG
 
 LAYOUT = "\n\t"  # control characters that lines may hold
-GOOD, BAD = "✓", "✗"  # signs of success and failure
 COLOURS = {GOOD: "\033[32m{}\033[0m", BAD: "\033[31m{}\033[0m"}  # green and red
 PLAIN = {GOOD: "+", BAD: "x"}  # for streams that cannot encode the signs
 NOTED = 60.0  # between two lines about a campaign where stderr is no terminal [s]
@@ -217,17 +217,6 @@ def show(json: bool, facts: Any, lines: Iterable[str]) -> None:
     else:
         for line in lines:
             print_line(line)
-
-
-def marked(good: bool, text: str) -> str:
-    """Return a text, on a terminal with the sign of success or failure before it; `print_line` colours the sign."""
-    return f"{GOOD if good else BAD} {text}" if sys.stdout.isatty() else text
-
-
-def file_lines(files: Mapping[str, object]) -> Iterator[str]:
-    """Return one line per written file: name and path."""
-    width = max([8, *map(len, files)])
-    return (f"  {name:{width}} {path}" for name, path in files.items())
 
 
 def this_command() -> str:

@@ -12,11 +12,12 @@ import typer.core
 import typer.main
 
 from antdrive.base.errors import FieldError, InputError, Terminated, input_error
+from antdrive.base.version import require_physics
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
 from antdrive.cli.console import print_error, print_line, print_traceback, report_compiling
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INTERRUPTED, INVALID_INPUT, SUCCEEDED
 from antdrive.cli.listings import version_line
-from antdrive.cli.options import with_physics, with_plan_limit
+from antdrive.cli.options import with_plan_limit
 from antdrive.sim.settings import PANELS
 
 SETTINGS: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
@@ -99,9 +100,10 @@ class _Commands(UserDict[str, Any]):
         if isinstance(command, Command):
             alone = typer.Typer(**SETTINGS)
             function = command.function(name)
-            function = with_physics(function) if "drives" in command.marks else function
             alone.command(name, cls=_Panelled)(with_plan_limit(function) if "plans" in command.marks else function)
-            command = self.data[name] = typer.main.get_command(alone)
+            made: Any = typer.main.get_command(alone)
+            made.drives = "drives" in command.marks
+            command = self.data[name] = made
             for one in command.params:
                 if one.param_type_name == "option" and one.name in SHORT:
                     one.opts.append(SHORT[one.name])
@@ -110,6 +112,8 @@ class _Commands(UserDict[str, Any]):
 
 class _Panelled(typer.core.TyperCommand):
     """A command that refuses options given twice and whose `--help` groups options in panels."""
+
+    drives = False  # whether it needs PyBullet to start
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words; raise InputError for a repeated option that is not repeatable."""
@@ -123,6 +127,8 @@ class _Panelled(typer.core.TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; raise InputError for a wrong value, with its option."""
+        if self.drives:
+            require_physics()  # before any work
         try:
             return super().invoke(ctx)
         except FieldError as error:

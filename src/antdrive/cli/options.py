@@ -16,7 +16,6 @@ import typer
 
 from antdrive.base import guarded
 from antdrive.base.errors import FieldError, InputError
-from antdrive.base.version import require_physics
 from antdrive.cli.parse import disc
 from antdrive.sim.settings import SETTINGS, DeclaredSetting
 
@@ -77,17 +76,6 @@ def with_settings(
         return called
 
     return decorated
-
-
-def with_physics(command: Command) -> Command:
-    """Refuse a command before any work if it cannot drive."""
-
-    @functools.wraps(command)
-    def called(**values: Any) -> Any:
-        require_physics()
-        return command(**values)
-
-    return called
 
 
 def with_plan_limit(command: Command) -> Command:

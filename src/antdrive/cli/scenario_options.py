@@ -29,27 +29,16 @@ class Ends:
     """Options that select a world's task, start and goal."""
 
     task: Annotated[
-        str | None,
-        option("NAME", "Task of the world file.  [default: the main task]", "--task", panel="World"),
+        str | None, option("NAME", "Task of the world file.  [default: the main task]", "--task", panel="World")
     ] = None
     start: Annotated[
-        str | None,
-        option(
-            "X,Y,YAW",
-            "Start pose [m, m, rad or 90deg].  [default: the task's]",
-            panel="World",
-        ),
+        str | None, option("X,Y,YAW", "Start pose [m, m, rad or 90deg].  [default: the task's]", panel="World")
     ] = None
-    goal: Annotated[
-        str | None,
-        option("X,Y", "Goal [m].  [default: the task's]", panel="World"),
-    ] = None
+    goal: Annotated[str | None, option("X,Y", "Goal [m].  [default: the task's]", panel="World")] = None
     frame: Annotated[
         str,
         option(
-            "world|map",
-            "Frame of --start and --goal: world, or map (the frame of the imported map).",
-            panel="World",
+            "world|map", "Frame of --start and --goal: world, or map (the frame of the imported map).", panel="World"
         ),
     ] = WORLD_FRAME
 

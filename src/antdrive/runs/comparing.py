@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from antdrive.base.errors import FieldError, few
+from antdrive.base.tables import marked, table
 from antdrive.sim.settings import COMPARED_SMOOTHING
 
 if TYPE_CHECKING:
@@ -125,6 +126,15 @@ class Comparison:
     def rows(self) -> list[tuple[str, ...]]:
         """Cells of the table: one row for each different drive, with all planners that drive it."""
         return [self._row(same) for runs in self.cases.values() for same in _groups(runs)]
+
+    def lines(self) -> Iterator[str]:
+        """Yield the runs, differences between planners, and equal drives as lines."""
+        yield from table(self.headings, ((*cells, marked(ended == "succeeded", ended)) for *cells, ended in self.rows))
+        if len(self.cases) > 1:
+            yield f"differences from {self.labels[0]} where both succeeded: median (minimum to maximum)"
+            heads = ("planner", "succeeded", "pairs", *COMPARED.values())
+            yield from table(heads, map(difference_cells, self.differences))
+        yield from self.same
 
     def _row(self, same: Sequence[Compared]) -> tuple[str, ...]:
         first = same[0]

@@ -32,10 +32,20 @@ def check_folder(folder: Path) -> None:
         raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
 
 
-def check_film(path: Path) -> None:
-    """Raise `InputError` unless a film can be written to `--film PATH`."""
+def check_film(path: Path | None, prelude: float, scenarios: Sequence[Scenario]) -> None:
+    """Raise `InputError` unless a film of drives can be written to `--film PATH`, with `--prelude` seconds of planning."""
+    from antdrive.planners import capabilities_of
+    from antdrive.planners.iterative import without_iterations
     from antdrive.views.film.film_options import ENCODERS
 
+    if prelude and path is None:
+        raise InputError("--prelude: needs --film")
+    if prelude and not any(capabilities_of(each.planner).iterative for each in scenarios):
+        first, several = scenarios[0], "needs an iterative planner; none of these is one"
+        one = without_iterations(first.planner, first.planner_name)
+        raise InputError(f"--prelude: {several if len(scenarios) > 1 else one}")
+    if path is None:
+        return
     if path.suffix.lower() not in ENCODERS:
         raise InputError(f"--film {path}: unknown suffix; choose one of {', '.join(ENCODERS)}")
     if path.is_dir():

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from antdrive.planners.user_code import LOADED
+
 
 def test_a_drive_becomes_tables(small_run, antdrive):
     small_run.rollout.save("rollout.npz")
@@ -51,3 +53,15 @@ def test_a_drive_that_kept_the_margin_is_said_to_have_used_nothing(antdrive):
     _, out, _ = antdrive("margin", "r")
     assert "no loss: the robot never came closer to an obstacle than the margin" in out
     assert "largest loss: " not in out
+
+
+@pytest.mark.slow
+def test_the_planning_of_ones_own_planner_is_filmed_with_its_class(antdrive, refused, small):
+    own = "class Own(MaxMinAnts): pass"
+    Path("own.py").write_text(f"from antdrive.planners import MaxMinAnts\n{own}\n")
+    set_up = ("--set", "planner.ants=5", "--set", "planner.iterations=5")
+    assert antdrive("run", small, "-p", "own.py:Own", *set_up, "--no-figures", "-o", "r")[0] == 0
+    words = ("render", "r", "-o", "f.mp4", "--size", "160x160", "--fps", "2", "--prelude", "1")
+    LOADED.clear()  # as in another process
+    assert "no planner is called 'Own'" in refused(*words)
+    assert antdrive(*words, "--planner", "own.py:Own")[0] == 0

@@ -1,7 +1,7 @@
 """`antdrive compare`."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,23 +9,17 @@ import typer
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, write_json
-from antdrive.base.tables import table
+from antdrive.base.tables import file_lines
 from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, campaign_folders, compare_campaigns
-from antdrive.cli.console import file_lines, marked, planning, print_error, print_traceback, show
+from antdrive.cli.console import planning, print_error, print_traceback, show
 from antdrive.cli.entrants import check_worlds, entrants_of
 from antdrive.cli.exits import FAILED, SUCCEEDED
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives, print_faults, print_idle_settings, results_folder
 from antdrive.cli.scenario_options import Ends
-from antdrive.runs.comparing import (
-    COMPARED,
-    PLANNER_FAULT,
-    Comparison,
-    compare_scenarios,
-    difference_cells,
-)
+from antdrive.runs.comparing import PLANNER_FAULT, compare_scenarios
 from antdrive.runs.results_folder import mark_of
 from antdrive.sim.settings import COMPARED_SMOOTHING
 from antdrive.views.run_folder import check_film, check_folder, write_run
@@ -46,10 +40,7 @@ def compare(
     worlds: Annotated[list[str], argument("WORLD", "World names or files, or campaign folders.")],
     planner: Annotated[
         list[str] | None,
-        option(
-            "NAME",
-            "Planner; give two to six. LABEL=NAME labels one, to compare it under different options.",
-        ),
+        option("NAME", "Planner; give two to six. LABEL=NAME labels one, to compare it under different options."),
     ] = None,
     settings: Annotated[
         list[str] | None,
@@ -79,7 +70,7 @@ def compare(
     show the first pair. Exit code 0: every run succeeded.
     Campaign folders of `antdrive sweep`: prints success rates with intervals, outcomes, and a test of every pair.
     """
-    from antdrive.planners import PlannerError, capabilities_of
+    from antdrive.planners import PlannerError
     from antdrive.sim.pipeline import run
     from antdrive.sim.written import Written
 
@@ -95,12 +86,7 @@ def compare(
     names = list(dict.fromkeys(scenario.task.world.name for scenario in every))
     if len(names) < len(worlds):
         raise InputError(f"{' '.join(worlds)}: world names must be unique")
-    if film is not None:
-        check_film(film)
-    elif prelude:
-        raise InputError("--prelude: needs --film")
-    if prelude and not any(capabilities_of(scenario.planner).iterative for scenario in every):
-        raise InputError("--prelude: needs an iterative planner; none of these is one")
+    check_film(film, prelude, every)
     print_idle_settings(every, {"seed"} if seeds > 1 else ())
     numbers = range(given["seed"], given["seed"] + seeds)
     cases = [(name, number) for name in names for number in numbers]
@@ -134,7 +120,7 @@ def compare(
         write_json(folder / MARKER, {**facts, **compared.as_dict()})
         files |= _views(compared.logs, folder, film, figures, speed=speed, prelude=prelude)
     results = {"runs": {run.label: run.facts for run in first}, **compared.as_dict(), "files": files}
-    show(json, results, _lines(compared, files))
+    show(json, results, [*compared.lines(), *file_lines(files)])
     errors = Counter(run.facts["reason"] for run in compared.runs if run.facts["outcome"] == PLANNER_FAULT)
     code = print_faults(dict(errors.most_common()))
     if len(compared.logs) < 2:
@@ -156,14 +142,3 @@ def _views(
     if len(logs) > 1 and film is not None:
         files["film"] = film_drives(list(logs.values()), film, titles=list(logs), **options)["file"]
     return files
-
-
-def _lines(compared: Comparison, files: Mapping[str, str]) -> Iterator[str]:
-    rows = ((*cells, marked(ended == "succeeded", ended)) for *cells, ended in compared.rows)
-    yield from table(compared.headings, rows)
-    if len(compared.cases) > 1:
-        yield f"differences from {compared.labels[0]} where both succeeded: median (minimum to maximum)"
-        heads = ("planner", "succeeded", "pairs", *COMPARED.values())
-        yield from table(heads, map(difference_cells, compared.differences))
-    yield from compared.same
-    yield from file_lines(files)

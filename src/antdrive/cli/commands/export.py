@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 from antdrive.base.errors import InputError
+from antdrive.base.tables import file_lines
 from antdrive.cli import options
-from antdrive.cli.console import file_lines, show
+from antdrive.cli.console import show
 from antdrive.cli.options import flag, option
 from antdrive.cli.parse import xacro
 

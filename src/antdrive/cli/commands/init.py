@@ -7,7 +7,8 @@ from typing import Annotated
 
 from antdrive.base.atomic import made_folder, write_text
 from antdrive.base.errors import InputError
-from antdrive.cli.console import file_lines, print_line
+from antdrive.base.tables import file_lines
+from antdrive.cli.console import print_line
 from antdrive.cli.options import argument
 
 TEMPLATE = Path(__file__).parents[2] / "template"

@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from antdrive.base.atomic import folder_lock
+from antdrive.base.tables import file_lines
 from antdrive.cli import options
-from antdrive.cli.console import file_lines, planning, show
+from antdrive.cli.console import planning, show
 from antdrive.cli.options import option
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.views.run_folder import suffixes

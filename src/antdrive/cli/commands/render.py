@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
+from antdrive.base.tables import file_lines
 from antdrive.cli import options
-from antdrive.cli.console import file_lines, show
+from antdrive.cli.console import show
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives
 from antdrive.cli.parse import size as parse_size

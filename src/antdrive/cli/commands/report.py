@@ -5,9 +5,10 @@ from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import format_size
+from antdrive.base.tables import file_lines
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, is_campaign, refuse_campaign_options
-from antdrive.cli.console import file_lines, show
+from antdrive.cli.console import show
 from antdrive.cli.options import argument, flag, option
 
 PRINTED = (".pdf", ".svg")  # suffixes of charts

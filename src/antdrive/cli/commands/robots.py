@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 from antdrive.base.checks import pair
 from antdrive.base.errors import InputError
 from antdrive.base.files import summary_of
+from antdrive.base.tables import file_lines
 from antdrive.cli import options
-from antdrive.cli.console import file_lines, show
+from antdrive.cli.console import show
 from antdrive.cli.listings import Row, robot_lines
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import import_target, numbers, xacro

@@ -1,20 +1,17 @@
 """`antdrive run`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from antdrive.base.atomic import folder_lock
-from antdrive.base.errors import InputError
+from antdrive.base.tables import file_lines, marked
 from antdrive.cli import options
-from antdrive.cli.console import bar, file_lines, marked, planning, show, stage, this_command
+from antdrive.cli.console import bar, planning, show, stage, this_command
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, print_idle_settings
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.sim.settings import SETTINGS
 from antdrive.views.run_folder import check_film, check_folder, default_folder, naming_saved, write_result, write_run
-
-if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
 
 
 @options.with_settings(name for name, one in SETTINGS.items() if one.flag)
@@ -44,7 +41,11 @@ def run(
     with stage("reading the scenario"):
         scenario = setup.scenario(ends.of(world), given)
     folder = out or default_folder(scenario)
-    _check_views(scenario, film, prelude, gui)
+    if gui:
+        from antdrive.views.window import check_display
+
+        check_display()
+    check_film(film, prelude, [scenario])
     check_folder(folder)
     print_idle_settings([scenario])
     with folder_lock(folder):
@@ -66,21 +67,3 @@ def run(
 
         show_window(result.rollout)
     return result.succeeded
-
-
-def _check_views(scenario: "Scenario", film: Path | None, prelude: float, gui: bool) -> None:
-    """Raise InputError before any work if the film cannot be written or the window cannot be opened."""
-    if gui:
-        from antdrive.views.window import check_display
-
-        check_display()
-    if prelude > 0:
-        from antdrive.planners import capabilities_of
-        from antdrive.planners.iterative import without_iterations
-
-        if film is None:
-            raise InputError("--prelude: needs --film")
-        if not capabilities_of(scenario.planner).iterative:
-            raise InputError(f"--prelude: {without_iterations(scenario.planner, scenario.planner_name)}")
-    if film is not None:
-        check_film(film)

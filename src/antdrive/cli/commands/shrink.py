@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
+from antdrive.base.tables import file_lines
 from antdrive.cli import options
-from antdrive.cli.console import file_lines, show, this_command, working
+from antdrive.cli.console import show, this_command, working
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import film_drives, results_folder
 from antdrive.cli.scenario_options import with_chosen_margin

@@ -26,13 +26,7 @@ def sweep(
     generate: Annotated[
         list[str] | None, option("KIND:SEEDS", "Random worlds: forest:20 or barn:0-9. Repeatable.")
     ] = None,
-    planner: Annotated[
-        list[str] | None,
-        option(
-            "NAME",
-            "Planner name or FILE.py:CLASS. Repeatable.",
-        ),
-    ] = None,
+    planner: Annotated[list[str] | None, option("NAME", "Planner name or FILE.py:CLASS. Repeatable.")] = None,
     settings: Annotated[
         list[str] | None,
         option(
@@ -64,20 +58,14 @@ def sweep(
     keep: Annotated[
         str | None, option("WHICH", "Logs to keep: none, failed, all.  [default: campaign's]", "--keep")
     ] = None,
-    run_limit: Annotated[
-        float | None,
-        option("SECONDS", "Wall-clock limit per run [s].", "--run-limit"),
-    ] = None,
+    run_limit: Annotated[float | None, option("SECONDS", "Wall-clock limit per run [s].", "--run-limit")] = None,
     retry_crashed: Annotated[bool, flag("Repeat crashed runs.", "--retry-crashed")] = False,
     again: Annotated[
         list[str] | None,
         option("NAME", "Repeat runs of a planner or with an outcome, such as planner_fault. Repeatable."),
     ] = None,
     dry_run: Annotated[bool, flag("Only print the number of runs and of missing runs.", "--dry-run")] = False,
-    report: Annotated[
-        Path | None,
-        option("FILE", "Also write a report: .html, .md, .tex or .csv."),
-    ] = None,
+    report: Annotated[Path | None, option("FILE", "Also write a report: .html, .md, .tex or .csv.")] = None,
     json: options.Json = False,
     **given: Any,
 ) -> int:

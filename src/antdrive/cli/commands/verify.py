@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
+from antdrive.base.tables import marked
 from antdrive.base.version import require_physics
 from antdrive.cli import options
-from antdrive.cli.console import marked, print_error, print_json, print_line
+from antdrive.cli.console import print_error, print_json, print_line
 from antdrive.cli.exits import INVALID_INPUT
 from antdrive.cli.options import argument, flag, option
 
