@@ -27,11 +27,10 @@ from antdrive.planners import Query, load_planner, pull_taut
 from antdrive.planners.anyangle.tangent import shortest
 from antdrive.planners.smoothing._kernels_smooth import encloses
 from antdrive.robots import Footprint, Noise, RobotSpec, load_robot
-from antdrive.runs.pool import call_all
 from antdrive.sim import Scenario, run
 from antdrive.sim.log.metrics import measure, tracking_error
 from antdrive.worlds import Task, World, generate, import_barn, rasterise
-from benchmarks.markdown import command_line, missing, print_tables, table
+from benchmarks.markdown import call_all, command_line, missing, print_tables, table
 from tools.shared_data import BARN
 
 SMALLEST = ("--worlds 2 --jobs 1",)

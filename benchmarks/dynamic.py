@@ -26,7 +26,6 @@ import numpy as np
 from antdrive.base.plane import polyline_length
 from antdrive.planners import Query, plan_in_time
 from antdrive.robots import load_robot
-from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, run
 from antdrive.sim.log.sights import tracked_rows
 from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED
@@ -44,7 +43,7 @@ from antdrive.worlds import (
     rasterise,
 )
 from benchmarks.drives import with_lidar
-from benchmarks.markdown import command_line, missing, print_tables, table
+from benchmarks.markdown import call_all, command_line, missing, print_tables, table
 from tools.shared_data import DYNABARN
 
 SMALLEST = ("--most 1 --jobs 1 --only given",)

@@ -34,7 +34,6 @@ from antdrive.robots.clearance import outline_of
 from antdrive.robots.default_margin import line_margin
 from antdrive.runs.campaigns import make_campaign, sweep
 from antdrive.runs.margins.loss import loss_on_course
-from antdrive.runs.pool import call_all
 from antdrive.sim.compose import route_planner
 from antdrive.sim.driving.routes import grid_of
 from antdrive.sim.scenario import LossFactors, Scenario
@@ -43,7 +42,7 @@ from antdrive.worlds.headings import Outline, turn_clear
 from antdrive.worlds.world import PointWorld, by_geometry
 from benchmarks.drives import Result, barn_tasks, drive, with_lidar
 from benchmarks.lattice import Flood, Point, Shape, flood
-from benchmarks.markdown import command_line, print_tables, table
+from benchmarks.markdown import call_all, command_line, print_tables, table
 from tools.shared_data import BARN
 
 SMALLEST = (

@@ -16,10 +16,9 @@ import numpy as np
 
 from antdrive.runs.margins.choice import RESERVE, Calibration, choose_margin, predicted_loss, with_chosen_margin
 from antdrive.runs.margins.loss import loss_on_course
-from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.worlds import generate
-from benchmarks.markdown import command_line, print_table
+from benchmarks.markdown import call_all, command_line, print_table
 
 SMALLEST = (
     "--worlds 2 --robots turtlebot --smoothings taut --noises 0 --jobs 1",

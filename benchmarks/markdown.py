@@ -1,4 +1,4 @@
-"""Command-line options, files of results and Markdown tables shared by benchmarks and audits.
+"""Command-line options, files of results, processes and Markdown tables shared by benchmarks and audits.
 
 Each benchmark lists the arguments of its smallest calls in `SMALLEST`. `tests/benchmarks` makes these calls.
 """
@@ -91,6 +91,14 @@ def current_commit() -> str:
     command = ["git", "rev-parse", "--short", "HEAD"]
     done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
     return done.stdout.strip()
+
+
+def call_all(calls: Iterable[Callable[[], Any]], jobs: int | None = None) -> list[Any]:
+    """Return the results of calls without arguments, run in processes (None: one per core)."""
+    from antdrive.runs.pool import Pool, call_now, processes_for
+
+    with Pool(processes_for(jobs)) as pool:
+        return list(pool.results(call_now, calls))
 
 
 def table(heads: str | Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:

@@ -33,7 +33,6 @@ from antdrive.robots import list_robots
 from antdrive.runs.barn_challenge import by_world, campaign_data, reference_times, unpacked
 from antdrive.runs.campaigns import sweep
 from antdrive.runs.campaigns.results import SweepResults
-from antdrive.runs.pool import call_all
 from antdrive.runs.statistics.intervals import means_by_world
 from antdrive.runs.statistics.price import Ratio, prices
 from antdrive.runs.statistics.run_table import RunTable
@@ -41,7 +40,7 @@ from antdrive.runs.statistics.significance import mcnemar
 from antdrive.views.film.video import film_failures
 from antdrive.worlds import generate
 from benchmarks.drives import Result, drive
-from benchmarks.markdown import command_line, missing, print_tables, table
+from benchmarks.markdown import call_all, command_line, missing, print_tables, table
 from tools.shared_data import BARN
 
 SMALLEST = (

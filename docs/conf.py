@@ -72,6 +72,7 @@ nitpick_ignore_regex = [
     ("py:class", r"antdrive\.[\w.]+\._kernels_\w+\.\w+|MoveGraph"),
     # How `sweep` words the origin of random tasks.
     ("py:class", r"antdrive\.runs\.campaigns\.job\.TaskOrigin"),
+    ("py:class", "ErrorAt"),  # a type of functions
     # How a record's field is read from JSON.
     ("py:.*", r"antdrive\.[\w.]+\.(Annotated|_to_\w+)"),
     # Contents of files, whose keys the pages on formats describe.

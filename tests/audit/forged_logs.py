@@ -30,6 +30,7 @@ from antdrive.worlds import point_clearance
 
 Array = npt.NDArray[Any]
 LEVELS = ("load", "verify", "files", "replay", "none")
+UNHASHED = ("digest", "times", "written")  # keys of the record that the digest does not cover
 ROWS = ("t", "pose", "twist", "command", "clearance", "limiter", "movers", "estimate", "actuated")
 
 
@@ -123,9 +124,9 @@ class Log:
     def write(self, path: Path) -> None:
         """Write the log with a matching digest (docs/reference/rollout-format.md)."""
         try:
-            text = DriveRecord.from_json(json.dumps(self.record)).to_json(without=("digest", "times"))
+            text = DriveRecord.from_json(json.dumps(self.record)).to_json(without=UNHASHED)
         except (FieldError, InputError, ValueError):
-            values = {key: value for key, value in self.record.items() if key not in ("digest", "times")}
+            values = {key: value for key, value in self.record.items() if key not in UNHASHED}
             text = json.dumps(values, sort_keys=True)
         self.record["digest"] = self.sealed or digest(self.arrays, text)
         written = {name: np.ascontiguousarray(self[name]) for name in written_of(self.arrays)}

@@ -1,6 +1,8 @@
 """Every benchmark and every audit runs in its smallest size: `SMALLEST` of its module has the words of each call."""
 
 import ast
+import contextlib
+import importlib
 import json
 import os
 import shlex
@@ -34,6 +36,12 @@ CALLS = {
 def test_every_benchmark_has_a_smallest_size():
     assert [name for name, calls in CALLS.items() if calls == []] == []
     assert len([name for name, calls in CALLS.items() if calls]) > 20
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_benchmark_finds_what_it_imports(name):
+    with contextlib.suppress(SystemExit):  # packages are missing
+        importlib.import_module(name)
 
 
 #: Runs each command that it reads in a copy of itself, which has imported and loaded what most of them need.

@@ -8,7 +8,7 @@ import pytest
 from antdrive.planners import load_planner
 from antdrive.robots import load_robot
 from antdrive.sim import Rollout, Scenario, run
-from antdrive.sim.written import command_of
+from antdrive.sim.recorded import command_of
 from antdrive.worlds import Disc, load_task, save_task
 from tests.records import changed
 

@@ -24,7 +24,7 @@ class Loading(GridPlanner):
 
     blocks: list[int] = []  # noqa: RUF012 - shared on purpose
 
-    def _plan(self, query, rng):
+    def search(self, query, rng):
         self.blocks.append(kernel_cache.blocks)
         NOW.append(NOW[-1] + 1.0)
         with kernel_cache.account, kernel_cache.account:

@@ -9,12 +9,14 @@ import typer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.base import InputError
+from antdrive.base.errors import FieldError, InputError
 from antdrive.cli import options
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.planners import AStar, load_planner
-from antdrive.sim import Scenario
-from antdrive.sim.log.record import settings_of
+from antdrive.robots import list_robots
+from antdrive.sim import Scenario, run
+from antdrive.sim.log.record import DriveRecord, settings_of
+from antdrive.sim.recorded import command_of
 from antdrive.sim.settings import LOCALISATIONS, SETTINGS, SMOOTHINGS
 from antdrive.sim.written import Written
 from antdrive.worlds import load_task
@@ -163,3 +165,27 @@ def test_an_error_has_the_place_of_its_key(words, key):
     with pytest.raises((InputError, ValueError)) as said:
         Written.read({"world": "forest", "planner": "astar", **words}).scenario(at=at)
     assert getattr(said.value, "key", "") == key or str(said.value) == f"here.{key}"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [5, {}, {"world": 5}, {"world": {"size": 3}}, {"world": "a", "unseen": 5}, {"world": "a", "sees": 5},
+     {"world": "a", "goal": ["x", 1]}, {"world": "a", "seed": "1"},
+     {"world": "a", "planner": 5}, {"world": "a", "avoid": 7}, {"world": "a", "odd": 1}],
+)  # fmt: skip
+def test_a_log_with_words_that_are_none_is_refused(small_run, words):
+    record = small_run.rollout.record.as_dict()
+    with pytest.raises(FieldError, match=r"record\.written"):
+        DriveRecord.from_json(json.dumps({**record, "written": words}))
+
+
+def test_a_log_names_the_files_that_its_drive_was_given(tmp_path, monkeypatch):
+    (tmp_path / "robot.yaml").write_text(list_robots()["jackal"].read_text())
+    monkeypatch.chdir(tmp_path)
+    s = Written(world="empty", planner="astar", robot="robot.yaml", settings={"margin": 0.1}).scenario(tmp_path)
+    record = run(dataclasses.replace(s, time_limit=0.5)).rollout.record
+    read = DriveRecord.from_json(dataclasses.replace(record, digest="0").to_json())
+    assert (
+        command_of(read)
+        == "antdrive run empty --planner astar --robot robot.yaml --margin 0.1 --time-limit 0.5 --seed 0"
+    )

@@ -106,8 +106,8 @@ def outline_at(task: Task, outline: Outline) -> Outline:
     from antdrive.worlds.headings import sweep_clearance
 
     x, y, yaw = task.start
-    room = sweep_clearance(x, y, x, y, yaw, outline, task.world.discs, task.world.bounds)
-    return outline if room > 0 else outline._replace(reach=outline.reach + room - ROOM)
+    clearance = sweep_clearance(x, y, x, y, yaw, outline, task.world.discs, task.world.bounds)
+    return outline if clearance > 0 else outline._replace(reach=outline.reach + clearance - ROOM)
 
 
 def lead_heading(pose: Pose, x: float, y: float, outline: Outline, world: World, *, backwards: bool) -> float:

@@ -13,6 +13,6 @@ from .pipeline import plan as plan
 from .pipeline import run as run
 from .policy import Perception as Perception
 from .policy import ReplanPolicy as ReplanPolicy
+from .recorded import rebuilt as rebuilt
 from .scenario import Scenario as Scenario
 from .written import Written as Written
-from .written import rebuilt as rebuilt

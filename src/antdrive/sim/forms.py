@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, get_args
 
-from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
+from pydantic import BaseModel, Field, PlainValidator, TypeAdapter, ValidationError, WithJsonSchema
 
 from antdrive.base.checks import show, suggest
 from antdrive.base.errors import FieldError
@@ -255,6 +256,16 @@ def given_settings(entry: BaseModel) -> dict[str, Any]:
     """Return the settings that a file gives, by key."""
     keys = {one.key for one in SETTINGS.values()} & entry.model_fields_set
     return {one.key: getattr(entry, one.key) for one in SETTINGS.values() if one.key in keys}
+
+
+def require_settings(given: Mapping[str, Any]) -> None:
+    """Raise FieldError for a value, by key, that no file may hold."""
+    for one in SETTINGS.values():
+        if one.key in given:
+            try:
+                TypeAdapter(written_kind(one)).validate_json(json.dumps(given[one.key]), strict=True)
+            except ValidationError as error:
+                raise FieldError(one.key, error.errors(include_url=False)[0]["msg"]) from None
 
 
 def setting_words(given: Mapping[str, Any]) -> list[str] | None:

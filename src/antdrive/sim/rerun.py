@@ -27,8 +27,8 @@ from antdrive.sim.driving.replay import ROUNDING, ReplayCheck, offsets, replay
 from antdrive.sim.log.record import PROOFS, Proof, plain_value
 from antdrive.sim.log.rollout import FORMS, NOISY, ROWS, Rollout
 from antdrive.sim.pipeline import driven, plan
+from antdrive.sim.recorded import rebuilt
 from antdrive.sim.scenario import Scenario
-from antdrive.sim.written import rebuilt
 
 LONGER = 1.0  # a rerun may outlast its log by this time [s]
 LONGEST = 60  # characters of a value in a message

@@ -19,17 +19,11 @@ from antdrive.sim.settings import SETTINGS
 if TYPE_CHECKING:
     from antdrive.planners import Planner
     from antdrive.robots import RobotSpec
-    from antdrive.sim.log.record import DriveRecord
     from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Task
 
 #: Returns the error for a key and its problem, with the key's place: a file and its line, or an option.
 ErrorAt: TypeAlias = Callable[[str, str], InputError]
-
-
-def _as_keys(key: str, problem: str) -> InputError:
-    """Return an error whose place is the key itself."""
-    return FieldError(key, problem).as_input()
 
 
 @contextlib.contextmanager
@@ -47,15 +41,7 @@ def unchosen(s: Scenario) -> Scenario:
     return s
 
 
-_KINDS: Mapping[str, Any] = {
-    "world": (str, dict),
-    "planner": (str, dict),
-    "start": (list, tuple),
-    "goal": (list, tuple),
-    "task": str,
-    "robot": str,
-    "seed": int,
-}
+_KINDS: Mapping[str, Any] = {"start": (list, tuple), "goal": (list, tuple), "task": str, "robot": str, "seed": int}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +82,7 @@ class Written:
         """
         own = {one.name for one in dataclasses.fields(cls)} - {"settings", "options"}
         planner = data.get("planner", "ants")
-        options = {} if isinstance(planner, str) else dict(planner)
+        options = dict(planner) if isinstance(planner, dict) else {}
         name = planner if isinstance(planner, str) else options.pop("name", None)
         if not isinstance(name, str):
             raise FieldError("planner.name", "missing; write the planner's name, or FILE.py:CLASS or MODULE:CLASS")
@@ -110,6 +96,9 @@ class Written:
             wanted = _KINDS.get(key)
             if wanted is not None and not isinstance(value, wanted):
                 raise FieldError(key, f"has another type, got {show(value)}")
+        world = data.get("world")
+        if not isinstance(world.get("generate") if isinstance(world, dict) else world, str):
+            raise FieldError("world", "write a file, a name of the catalogue, or {generate: forest, seed: 7}")
         for key, count in (("start", 3), ("goal", 2)):
             ends = given.get(key, [0.0] * count)
             if len(ends) != count or not all(isinstance(number, int | float) for number in ends):
@@ -206,9 +195,7 @@ class Written:
         from antdrive.worlds.generators.generate import generated
 
         options = dict(world)
-        kind, seed = options.pop("generate", None), options.pop("seed", 0)
-        if not isinstance(kind, str):
-            raise FieldError("world", "write a file, a name of the catalogue, or {generate: forest, seed: 7}")
+        kind, seed = options.pop("generate"), options.pop("seed", 0)
         if self.task is not None:
             raise FieldError("task", "a random world has no named tasks")
         if type(seed) is not int or not 0 <= seed < 2**63:
@@ -233,7 +220,7 @@ class Written:
         from antdrive.sim.forms import written
 
         words: dict[str, Any] = {}
-        for name, named in (("task", _named_task), ("planner", _named_planner), ("robot", _named_robot)):
+        for name, named in (("task", named_task), ("planner", named_planner), ("robot", named_robot)):
             made, said = s.said.get(name, (None, {}))
             words |= said if made is getattr(s, name) else named(getattr(s, name), s.planner_label)
         settings = written(lambda name: getattr(s, name)) | ({} if s.chosen is None else {"margin": "auto"})
@@ -290,7 +277,7 @@ class Written:
         return self.moved(shown)
 
 
-def _named_task(task: Task, _: str) -> dict[str, Any]:
+def named_task(task: Task, _: str) -> dict[str, Any]:
     """Return a task's name in the catalogue, with its start and goal if they differ; else a file's name."""
     from antdrive.sim.log.record import canonical_hash
 
@@ -313,7 +300,7 @@ def _catalogue_task(name: str) -> Task | None:
     return load_task(name) if name in list_worlds() else None
 
 
-def _named_robot(robot: RobotSpec, _: str) -> dict[str, Any]:
+def named_robot(robot: RobotSpec, _: str) -> dict[str, Any]:
     """Return a robot's name in the catalogue, else a file's name."""
     from antdrive.robots import list_robots, load_robot
     from antdrive.sim.log.record import canonical_hash
@@ -322,7 +309,7 @@ def _named_robot(robot: RobotSpec, _: str) -> dict[str, Any]:
     return {"robot": robot.name if same else f"{file_name(robot.name)}.yaml"}
 
 
-def _named_planner(planner: Planner | Mapping[str, Any], label: str) -> dict[str, Any]:
+def named_planner(planner: Planner | Mapping[str, Any], label: str) -> dict[str, Any]:
     """Return a planner's registered name, else that of its class, and the options that differ from the registered ones."""
     from antdrive.planners import list_planners
     from antdrive.sim.log.record import settings_of
@@ -343,102 +330,3 @@ def _generating(world: dict[str, Any]) -> tuple[str, str]:
     words = ["antdrive", "worlds", "generate", kind, "--seed", str(seed), "--out", name]
     words += [word for key, value in world.items() for word in ("--set", f"{key}={option_text(value)}")]
     return name, f"{shlex.join(words)} && "
-
-
-def written_of(record: DriveRecord) -> Written:
-    """Return the scenario of a log as written; settings of logs without it are those that were in force."""
-    if record.written is not None:
-        return record.written
-    words = _named_task(record.task, "") | _named_planner(record.planner.settings, record.planner.name)
-    return Written(**words, **_named_robot(record.robot, ""), settings=_settings_in_force(record), seed=record.seed)
-
-
-def command_of(record: DriveRecord) -> str | None:
-    """Return the `antdrive run` command of a log's scenario; None if a setting has no option."""
-    try:
-        return written_of(record).command()
-    except (FieldError, InputError):
-        return None
-
-
-def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenario:
-    """Return the scenario of a log's record. With the same versions it gives the same drive, bit for bit.
-
-    Args:
-        record: the record of a log
-        planner: the planner; FILE.py:CLASS or MODULE:CLASS: custom code with the record's settings; None: the planner of
-            the record's name, with the record's settings
-
-    Raises:
-        InputError: the planner or controller cannot be found by its name, or has custom settings.
-    """
-    from antdrive.planners.user_code import is_user_code, record_name
-
-    name = record.planner.name
-    made: dict[str, Any] = {"task": record.task, "robot": record.robot, "planner_name": name}
-    if isinstance(planner, str):
-        if record_name(planner) not in (planner, name):
-            raise InputError(f"planner: the log's planner is {name!r:.60}, not {record_name(planner)!r:.60}")
-        if not is_user_code(planner):
-            raise InputError(
-                f"planner: write FILE.py:CLASS or MODULE:CLASS, got {planner!r:.60}; omit it for registered planners"
-            )
-        word = planner
-    elif planner is None:
-        word = made["planner_name"] = _registered(name)
-    else:
-        word, made["planner"] = "", planner
-    try:
-        settings = _settings_in_force(record)
-    except FieldError as error:
-        raise InputError(str(error.under("record"))) from None
-    words = Written(
-        world="", planner=word, options=record.planner.settings, settings=settings, seed=record.seed,
-    )  # fmt: skip
-
-    def at(key: str, problem: str) -> InputError:
-        return _as_keys(key if key.startswith("planner") else f"record.{key}", problem)
-
-    return words.scenario(at=at, **made)
-
-
-def _registered(name: str) -> str:
-    """Return the registered name of a record's planner, which may be that of its class."""
-    from antdrive.planners import list_planners
-
-    known = list_planners()
-    named = [key for key, planner in known.items() if name in (key, type(planner).__name__)]
-    if not named:
-        raise InputError(
-            f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; name its class "
-            f"(--planner FILE.py:CLASS), or register it under the entry point antdrive.planners"
-        )
-    return name if name in named else named[0]
-
-
-def _settings_in_force(record: DriveRecord) -> dict[str, Any]:
-    """Return the settings of a log's record that differ from the defaults, by key.
-
-    Raises:
-        FieldError: a setting is unknown or invalid.
-    """
-    from antdrive.sim.forms import scenario_fields, written
-
-    if record.controller.name != "PurePursuit":
-        raise FieldError("controller.name", f"{record.controller.name!r:.60} cannot be rebuilt; only PurePursuit can")
-    plain = ("noise", "margin", "time_limit", "physics_hz", "control_hz", "unseen")
-    given: dict[str, Any] = {name: getattr(record, name) for name in plain}
-    given |= {SETTINGS[name].key: value for name, value in (record.settings or {}).items()}
-    given |= {"smoothing": record.smoothing.asked, "cell": record.asked_cell or record.cell}
-    given["controller"] = dict(record.controller.settings)
-    if record.sensing is not None:
-        given |= dataclasses.asdict(record.sensing)
-    switched = {"avoid": record.avoidance} if record.perception is not None else {}
-    if record.perception is not None:
-        reach = record.perception.range_m
-        given["sees"] = record.perception.kind + ("" if reach is None else f":{reach!r}")
-    if record.perception is not None or record.sensing is not None:
-        switched["replan"] = record.replanning
-    given |= {key: "none" if value is None else dict(value) for key, value in switched.items()}
-    fields = scenario_fields(given)
-    return {key: value for key, value in written(fields.__getitem__).items() if key != "seed"}

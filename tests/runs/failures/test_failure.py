@@ -13,7 +13,7 @@ from antdrive.runs.suites import Baseline, Demands, load_suite
 from antdrive.runs.suites.demands import Bound
 from antdrive.sim import METRICS, Certificate, DriveRecord, Outcome, Perception, ReplanPolicy, Scenario, run
 from antdrive.sim.log.record import ComponentRecord, settings_of
-from antdrive.sim.written import rebuilt
+from antdrive.sim.recorded import rebuilt
 from antdrive.worlds import Cruising, Disc, Task, World
 from tests.records import made_up_record
 

@@ -27,8 +27,8 @@ from antdrive.sim.driving.survey import MoverTracking, SimulatedLidar, Survey, r
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.physics.engine import State
 from antdrive.sim.policy import SCANNED, STALLED, Perception
+from antdrive.sim.recorded import rebuilt
 from antdrive.sim.sensing import Scanner
-from antdrive.sim.written import rebuilt
 from antdrive.views.map_reconstruction import MapReconstruction
 from antdrive.worlds import Cruising, Disc, Route, Task, World, generate, load_task, rasterise
 from tests.records import changed

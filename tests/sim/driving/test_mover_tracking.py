@@ -22,8 +22,8 @@ from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import PerceptionRecord
 from antdrive.sim.log.rollout import ranges_of
 from antdrive.sim.log.sights import passed
+from antdrive.sim.recorded import rebuilt
 from antdrive.sim.sensing import KnownGround, Scanner
-from antdrive.sim.written import rebuilt
 from antdrive.worlds import Disc, Keyframed, Route, Task, World
 from tests.records import COARSE, changed
 

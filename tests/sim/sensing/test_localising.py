@@ -57,26 +57,6 @@ def test_the_heading_drifts_by_bias_scale_and_noise_whatever_the_rate(hz):
     assert np.std(errors) == pytest.approx(expected, rel=0.15)
 
 
-def test_errors_of_a_straight_drive_are_those_of_the_wheels():
-    level = Odometry(gyro_bias=0.0, gyro_noise=0.0)
-    ways = []
-    for seed in range(200):
-        reckoning = DeadReckoning(level, np.random.default_rng(seed))
-        for _ in range(100):
-            reckoning.advance(1.0, 0.0, 0.02)
-        ways.append(reckoning.pose[0])
-        assert reckoning.pose[1:] == (0.0, 0.0)
-    assert np.std(ways) == pytest.approx(2 * math.hypot(level.speed_scale, level.speed_noise / 10), rel=0.15)
-
-
-def test_a_robot_that_stands_drifts_by_its_gyro_alone():
-    reckoning = DeadReckoning(Odometry(), np.random.default_rng(2))
-    for _ in range(600):
-        reckoning.advance(0.0, 0.0, 1 / 60)
-    assert reckoning.pose[:2] == (0.0, 0.0)
-    assert 0 < abs(reckoning.pose[2]) < 0.2
-
-
 WORLD = World("room", (0.0, 0.0, 6.0, 5.0), (Disc(2.0, 3.5, 0.3), Disc(4.0, 1.5, 0.2), Disc(3.2, 4.1, 0.15)))
 POSE = (2.0, 1.5, 0.4)
 

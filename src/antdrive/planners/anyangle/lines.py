@@ -55,13 +55,13 @@ def route_ends(query: Query, *, touching: bool = False) -> RouteEnds:
 
     inflate = query.grid.inflate
     exact_start, exact_goal = _point(query.task.start[:2]), _point(query.task.goal)
-    room = [float(r) for r in point_clearance(query.task.world, [exact_start, exact_goal])]
-    fits = [r >= inflate - CONTACT if touching else r > inflate for r in room]
+    clearances = [float(r) for r in point_clearance(query.task.world, [exact_start, exact_goal])]
+    fits = [r >= inflate - CONTACT if touching else r > inflate for r in clearances]
     return RouteEnds(
         exact_start if fits[0] else start,
         exact_goal if fits[1] else goal,
         () if fits[0] else (exact_start,),
-        (exact_goal,) if not fits[1] and room[1] >= inflate - CONTACT else (),
+        (exact_goal,) if not fits[1] and clearances[1] >= inflate - CONTACT else (),
     )
 
 

@@ -265,11 +265,11 @@ def _around(arc: Arc, bulge: float, discs: Floats, bounds: Bounds, inflate: floa
         half_widths, middles = np.diff(cuts) / 2.0, (cuts[1:] + cuts[:-1]) / 2.0
         rim = np.array([arc.at(cut) for cut in cuts])
         corners = np.array([arc.at(m, 1.0 / math.cos(h)) for m, h in zip(middles, half_widths, strict=True)])
-        room = np.empty((2, len(corners)))
+        clearances = np.empty((2, len(corners)))
         box = np.asarray(bounds, dtype=np.float64)
-        segment_clearances(np.ascontiguousarray(rim[:-1]), corners, discs, box, room[0])
-        segment_clearances(corners, np.ascontiguousarray(rim[1:]), discs, box, room[1])
-        tight = (room.min(axis=0) < inflate - 1e-9) & (half_widths > 1e-5)
+        segment_clearances(np.ascontiguousarray(rim[:-1]), corners, discs, box, clearances[0])
+        segment_clearances(corners, np.ascontiguousarray(rim[1:]), discs, box, clearances[1])
+        tight = (clearances.min(axis=0) < inflate - 1e-9) & (half_widths > 1e-5)
         if not tight.any():
             return [(float(x), float(y)) for x, y in corners]
         cuts = np.sort(np.concatenate((cuts, middles[tight])))

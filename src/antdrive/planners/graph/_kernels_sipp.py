@@ -239,9 +239,9 @@ def most_legs(near: NearLegs) -> int:
 def safe_intervals(near: NearLegs, free: Array, frame: Frame, start: float, end: float) -> tuple[Array, Array, Array]:
     """Compute the fields of `Intervals`: when a robot can stand in each free cell between two times."""
     rows, cols = free.shape
-    room = rows * cols + len(near.number)
+    capacity = rows * cols + len(near.number)
     first = np.empty(rows * cols + 1, dtype=np.int64)
-    since, until = np.empty(room), np.empty(room)
+    since, until = np.empty(capacity), np.empty(capacity)
     most = most_legs(near)
     lows, highs = np.empty(most), np.empty(most)
     size = 0

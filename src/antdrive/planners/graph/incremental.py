@@ -264,8 +264,8 @@ class IncrementalSearch(CachedReplanner):
 
     def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
         if len(self._graph.mask) > len(self._arrays[0]):  # with turns, cells got more labels
-            room = len(self._graph.mask) * 5 // 4
-            self._arrays = [extended(*pair, room) for pair in zip(self._arrays, self._initial, strict=True)]
+            capacity = len(self._graph.mask) * 5 // 4
+            self._arrays = [extended(*pair, capacity) for pair in zip(self._arrays, self._initial, strict=True)]
         nodes, start = self._nodes(changed), query.start_node
         cells, diagonal, work = self._kernels.repair(nodes, self._graph, start, self._goal, self._state, *self._arrays)
         if not len(cells):

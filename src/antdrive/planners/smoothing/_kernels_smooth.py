@@ -143,11 +143,11 @@ def points_along(
     low, high = span(out[:size], 1)
     if max(right - left, high - low) < 1e-6:
         out[1, 0], out[1, 1], size = out[0, 0] + 1e-4 * cos, out[0, 1] + 1e-4 * sin, 2
-    room, length = np.empty(size - 1), np.empty(size - 1)
-    segment_clearances(out[: size - 1], out[1:size], discs, bounds, room)
+    clearance, length = np.empty(size - 1), np.empty(size - 1)
+    segment_clearances(out[: size - 1], out[1:size], discs, bounds, clearance)
     for i in range(size - 1):
         length[i] = math.hypot(out[i + 1, 0] - out[i, 0], out[i + 1, 1] - out[i, 1])
-    return out[:size], room, length
+    return out[:size], clearance, length
 
 
 @inline
@@ -463,18 +463,18 @@ def settle(first: Contacts, discs: Array, ends: Array) -> tuple[bool, Array, Arr
     contact is removed, or else the disc that the string enters most deeply becomes a contact.
     """
     count = len(first.disc)
-    room = 2 * count + 64
-    disc = np.empty(room, dtype=np.int64)
-    turn = np.empty(room, dtype=np.float64)
-    sweep = np.empty(room, dtype=np.float64)
+    capacity = 2 * count + 64
+    disc = np.empty(capacity, dtype=np.int64)
+    turn = np.empty(capacity, dtype=np.float64)
+    sweep = np.empty(capacity, dtype=np.float64)
     for i in range(count):
         disc[i], turn[i], sweep[i] = first.disc[i], first.turn[i], first.sweep[i]
     contacts = Contacts(disc, turn, sweep)
     boxes = boxes_around(discs)
-    links = np.empty((room + 1, 4), dtype=np.float64)
-    heading = np.empty(room + 1, dtype=np.float64)
-    for _ in range(3 * room):
-        if count > room - 2:
+    links = np.empty((capacity + 1, 4), dtype=np.float64)
+    heading = np.empty(capacity + 1, dtype=np.float64)
+    for _ in range(3 * capacity):
+        if count > capacity - 2:
             break
         count = merge_repeats(count, contacts)
         if not place_links(count, contacts, discs, ends, links, heading):

@@ -55,8 +55,10 @@ def _points_along(
     cells, ends = np.ascontiguousarray(grid.xy(plan.line)), np.array((start, task.goal))
     discs = kernels.discs_about(cells, ends, stretch, grid.inflate + more + BESIDE, world.discs)
     bounds = np.array(world.bounds, dtype=np.float64)
-    line, room, lengths = kernels.points_along(cells, ends, math.cos(yaw), math.sin(yaw), discs, bounds, grid.inflate)
-    return line, room, lengths, discs
+    line, clearances, lengths = kernels.points_along(
+        cells, ends, math.cos(yaw), math.sin(yaw), discs, bounds, grid.inflate
+    )
+    return line, clearances, lengths, discs
 
 
 #: The kinds of smoothing: the plan's line, that line pulled taut, or taut with more clearance where there is room.
@@ -114,13 +116,13 @@ def smooth(
     if grid.turns:
         return smooth_lines(plan, grid, task, kind)
     extra = clearance if kind == "clearance" else 0.0
-    line, room, lengths, discs = _points_along(plan, grid, task, 2 * extra + bulge, stretch)
+    line, clearances, lengths, discs = _points_along(plan, grid, task, 2 * extra + bulge, stretch)
     if kind == "none":
         return Route(line)
     bounds, inflate = np.array(task.world.bounds, dtype=np.float64), grid.inflate
     spare = max(0.0, plan.cost - lengths.cumsum().item(-1)) if math.isfinite(plan.cost) else 0.0
     xy, curvature, kinds, notes = [line[:1]], [np.zeros(1)], [], []
-    for first, last, clear in _runs(room, inflate):
+    for first, last, clear in _runs(clearances, inflate):
         run, own = line[first : last + 1], float(lengths[first:last].sum())
         piece = Piece(run, np.zeros(len(run)))
         if clear:
@@ -181,12 +183,12 @@ def _path(string: String) -> TangentPath:
     return TangentPath(tuple(pieces))
 
 
-def _runs(room: Floats, inflate: float) -> Iterator[tuple[int, int, bool]]:
+def _runs(clearances: Floats, inflate: float) -> Iterator[tuple[int, int, bool]]:
     """Yield first and last point of the parts of a polyline that keep the clearance or do not, and whether each keeps it.
 
-    `room` is the clearance of each segment [m].
+    `clearances` is the clearance of each segment [m].
     """
-    clear = room >= inflate - 1.01 * SLACK  # joined lines have exactly the clearance
+    clear = clearances >= inflate - 1.01 * SLACK  # joined lines have exactly the clearance
     cuts = [0, *(np.flatnonzero(clear[1:] != clear[:-1]) + 1).tolist(), len(clear)]
     for first, last in itertools.pairwise(cuts):
         yield first, last, bool(clear[first])
@@ -195,10 +197,10 @@ def _runs(room: Floats, inflate: float) -> Iterator[tuple[int, int, bool]]:
 def _clears(xy: Floats, discs: Floats, bounds: Bounds, inflate: float) -> bool:
     from antdrive.worlds import _kernels
 
-    room = np.empty(len(xy) - 1)
+    clearances = np.empty(len(xy) - 1)
     box = np.asarray(bounds, dtype=np.float64)
-    _kernels.segment_clearances(np.ascontiguousarray(xy[:-1]), np.ascontiguousarray(xy[1:]), discs, box, room)
-    return bool((room >= inflate - SLACK).all())
+    _kernels.segment_clearances(np.ascontiguousarray(xy[:-1]), np.ascontiguousarray(xy[1:]), discs, box, clearances)
+    return bool((clearances >= inflate - SLACK).all())
 
 
 def _smoothed(

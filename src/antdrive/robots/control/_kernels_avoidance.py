@@ -269,7 +269,7 @@ def outline_between(
 def passes_within(
     trail: Array,
     k: int,
-    keeps: Required,
+    required: Required,
     obstacles: ObstacleIndex,
     tuning: PursuitTuning,
     step: float,
@@ -278,17 +278,17 @@ def passes_within(
 
     A step is straight, or a few poses of the outline.
     """
-    length, outlined = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step, keeps.outline > -math.inf
+    length, outlined = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step, required.outline > -math.inf
     if abs(length) <= 1e-6 and not outlined:
         return False
     ax, ay, bx, by = trail[k, 0], trail[k, 1], trail[k + 1, 0], trail[k + 1, 1]
-    most, bounds = (keeps.outline + tuning.robot_radius if outlined else keeps.centre), obstacles.bounds
+    most, bounds = (required.outline + tuning.robot_radius if outlined else required.centre), obstacles.bounds
     discs = nearby(ax, ay, most + math.hypot(bx - ax, by - ay), obstacles)
     distance = clearance_below(most, ax, ay, bx, by, discs, bounds)
-    if distance < keeps.centre:
+    if distance < required.centre:
         return True
     return outlined and distance < most and outline_between(
-        trail[k], trail[k + 1], length, keeps.outline, discs, bounds, tuning
+        trail[k], trail[k + 1], length, required.outline, discs, bounds, tuning
     )  # fmt: skip
 
 

@@ -21,8 +21,8 @@ from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout, log_at, read_record
 from antdrive.sim.pipeline import Run, run
+from antdrive.sim.recorded import rebuilt
 from antdrive.sim.scenario import Scenario
-from antdrive.sim.written import rebuilt
 
 _BOUND = re.compile(r"\s*(\w+)\s*(<=|>=|<|>|==)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 

@@ -247,7 +247,11 @@ def _to_task(value: Any) -> Task:
 def _to_written(value: Any) -> Written:
     if not isinstance(value, Mapping):
         raise ValueError(f"must be an object as in a suite, got {_shown(value)}")
-    return Written.read(value)
+    from antdrive.sim.forms import require_settings  # which reads records
+
+    written = Written.read(value)
+    require_settings(written.settings)
+    return written
 
 
 def _to_outcome(value: Any) -> Outcome:

@@ -20,8 +20,8 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
+from antdrive.sim.recorded import command_of
 from antdrive.sim.verifying import false_claims, read_result
-from antdrive.sim.written import command_of
 from antdrive.views.pages.rendering import number, shown
 
 LONGEST_COMMAND = 4000  # characters

@@ -1,0 +1,113 @@
+"""The scenario of a log's record: in words, as a command, and built again."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+from antdrive.base.errors import FieldError, InputError
+from antdrive.planners import Planner, list_planners
+from antdrive.planners.user_code import is_user_code, record_name
+from antdrive.sim.forms import scenario_fields, written
+from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.settings import SETTINGS
+from antdrive.sim.written import Written, named_planner, named_robot, named_task
+
+if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
+
+
+def written_of(record: DriveRecord) -> Written:
+    """Return the scenario of a log as written; settings of logs without it are those that were in force."""
+    if record.written is not None:
+        return record.written
+    name = record.planner.name
+    words = (
+        named_task(record.task, name) | named_planner(record.planner.settings, name) | named_robot(record.robot, name)
+    )
+    return Written(**words, settings=_settings_in_force(record), seed=record.seed)
+
+
+def command_of(record: DriveRecord) -> str | None:
+    """Return the `antdrive run` command of a log's scenario; None if a setting has no option."""
+    try:
+        return written_of(record).command()
+    except (FieldError, InputError):
+        return None
+
+
+def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenario:
+    """Return the scenario of a log's record. With the same versions it gives the same drive, bit for bit.
+
+    Args:
+        record: the record of a log
+        planner: the planner; FILE.py:CLASS or MODULE:CLASS: custom code with the record's settings; None: the planner of
+            the record's name, with the record's settings
+
+    Raises:
+        InputError: the planner or controller cannot be found by its name, or has custom settings.
+    """
+    name = record.planner.name
+    made: dict[str, Any] = {"task": record.task, "robot": record.robot, "planner_name": name}
+    if isinstance(planner, str):
+        if record_name(planner) not in (planner, name):
+            raise InputError(f"planner: the log's planner is {name!r:.60}, not {record_name(planner)!r:.60}")
+        if not is_user_code(planner):
+            raise InputError(
+                f"planner: write FILE.py:CLASS or MODULE:CLASS, got {planner!r:.60}; omit it for registered planners"
+            )
+        word = planner
+    elif planner is None:
+        word = made["planner_name"] = _registered(name)
+    else:
+        word, made["planner"] = "", planner
+    try:
+        settings = _settings_in_force(record)
+    except FieldError as error:
+        raise InputError(str(error.under("record"))) from None
+    words = Written(
+        world="", planner=word, options=record.planner.settings, settings=settings, seed=record.seed,
+    )  # fmt: skip
+
+    def at(key: str, problem: str) -> InputError:
+        return FieldError(key if key.startswith("planner") else f"record.{key}", problem).as_input()
+
+    return words.scenario(at=at, **made)
+
+
+def _registered(name: str) -> str:
+    """Return the registered name of a record's planner, which may be that of its class."""
+    known = list_planners()
+    named = [key for key, planner in known.items() if name in (key, type(planner).__name__)]
+    if not named:
+        raise InputError(
+            f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; name its class "
+            f"(--planner FILE.py:CLASS), or register it under the entry point antdrive.planners"
+        )
+    return name if name in named else named[0]
+
+
+def _settings_in_force(record: DriveRecord) -> dict[str, Any]:
+    """Return the settings of a log's record that differ from the defaults, by key.
+
+    Raises:
+        FieldError: a setting is unknown or invalid.
+    """
+    if record.controller.name != "PurePursuit":
+        raise FieldError("controller.name", f"{record.controller.name!r:.60} cannot be rebuilt; only PurePursuit can")
+    plain = ("noise", "margin", "time_limit", "physics_hz", "control_hz", "unseen")
+    given: dict[str, Any] = {name: getattr(record, name) for name in plain}
+    given |= {SETTINGS[name].key: value for name, value in (record.settings or {}).items()}
+    given |= {"smoothing": record.smoothing.asked, "cell": record.asked_cell or record.cell}
+    given["controller"] = dict(record.controller.settings)
+    if record.sensing is not None:
+        given |= dataclasses.asdict(record.sensing)
+    switched = {"avoid": record.avoidance} if record.perception is not None else {}
+    if record.perception is not None:
+        reach = record.perception.range_m
+        given["sees"] = record.perception.kind + ("" if reach is None else f":{reach!r}")
+    if record.perception is not None or record.sensing is not None:
+        switched["replan"] = record.replanning
+    given |= {key: "none" if value is None else dict(value) for key, value in switched.items()}
+    fields = scenario_fields(given)
+    return {key: value for key, value in written(fields.__getitem__).items() if key != "seed"}
