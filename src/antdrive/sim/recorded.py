@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import Planner, list_planners
 from antdrive.planners.user_code import is_user_code, record_name
-from antdrive.sim.forms import scenario_fields, written
+from antdrive.sim.forms import require_settings, scenario_fields, written
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.settings import SETTINGS
 from antdrive.sim.written import Written, named_planner, named_robot, named_task
@@ -18,9 +18,15 @@ if TYPE_CHECKING:
 
 
 def written_of(record: DriveRecord) -> Written:
-    """Return the scenario of a log as written; settings of logs without it are those that were in force."""
+    """Return the scenario of a log as written; settings of logs without it are those that were in force.
+
+    Raises:
+        FieldError: what the record holds as written is no scenario.
+    """
     if record.written is not None:
-        return record.written
+        said = Written.read(record.written)
+        require_settings(said.settings)
+        return said
     name = record.planner.name
     words = (
         named_task(record.task, name) | named_planner(record.planner.settings, name) | named_robot(record.robot, name)

@@ -137,8 +137,8 @@ class Written:
         """
         from antdrive.planners import load_planner, record_name
         from antdrive.robots import load_robot
+        from antdrive.sim import Scenario  # which is built of words
         from antdrive.sim.forms import scenario_fields
-        from antdrive.sim.scenario import Scenario
 
         auto = self.settings.get("margin") == "auto" and "margin" not in made
         with placed(at):
