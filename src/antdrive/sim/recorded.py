@@ -10,7 +10,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import PLANNERS, Planner, list_planners, load_planner
 from antdrive.planners.user_code import is_user_code, record_name
 from antdrive.robots import list_robots
-from antdrive.sim.forms import scenario_fields, written
+from antdrive.sim.forms import require_settings, scenario_fields, written
 from antdrive.sim.log.record import DriveRecord, settings_of
 from antdrive.sim.settings import SETTINGS
 from antdrive.sim.written import Written, named_planner, named_robot, named_task
@@ -21,14 +21,20 @@ if TYPE_CHECKING:
 
 
 def written_of(record: DriveRecord) -> Written:
-    """Return the scenario of a log as written; settings of logs without it are those that were in force."""
+    """Return the scenario of a log as written; settings of logs without it are those that were in force.
+
+    Raises:
+        FieldError: what the record holds as written is no scenario.
+    """
     if record.written is not None:
-        return record.written
+        words = Written.read(record.written)
+        require_settings(words.settings)
+        return words
     name = record.planner.name
-    words = (
+    parts = (
         named_task(record.task, name) | named_planner(record.planner.settings, name) | named_robot(record.robot, name)
     )
-    return Written(**words, settings=_settings_in_force(record), seed=record.seed)
+    return Written(**parts, settings=_settings_in_force(record), seed=record.seed)
 
 
 def command_of(record: DriveRecord) -> str | None:
@@ -46,10 +52,10 @@ def false_words(record: DriveRecord) -> Iterator[str]:
     """
     if record.written is not None:
         try:
-            for key in _contradicted(record, record.written):
+            for key in _contradicted(record, written_of(record)):
                 yield f"record.written.{key}: contradicts the rest of the record"
         except (FieldError, InputError) as error:
-            yield f"record.written.{error.key}: {error.problem}"
+            yield str(FieldError(error.key, error.problem).under("record.written"))
 
 
 def _contradicted(record: DriveRecord, words: Written) -> Iterator[str]:

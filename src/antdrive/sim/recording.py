@@ -52,7 +52,7 @@ def rollout_of(
         outcome=log.outcome,
         reason=log.reason,
         physics=log.physics,
-        written=Written.of(s),
+        written=settings_of(Written.of(s).plain()),
         versions=versions(),
         times=TimesRecord(plan_s=answer.wall_s, drive_wall_s=wall, replans_s=tuple(parts.guide.walls)),
     )

@@ -88,7 +88,9 @@ class Written:
             raise FieldError("planner.name", "missing; write the planner's name, or FILE.py:CLASS or MODULE:CLASS")
         for key in ("file", "module"):
             if key in options and ":" not in name:
-                raise FieldError(f"planner.{key}", f"no key of planners; write {options[key]}:{name} as the planner's name")
+                raise FieldError(
+                    f"planner.{key}", f"no key of planners; write {options[key]}:{name} as the planner's name"
+                )
         settings = {key: value for key, value in data.items() if key not in own}
         known = {one.key for one in SETTINGS.values()}
         for key in settings:
@@ -140,8 +142,8 @@ class Written:
         """
         from antdrive.planners import load_planner, record_name
         from antdrive.robots import load_robot
+        from antdrive.sim import Scenario  # which is built of words
         from antdrive.sim.forms import scenario_fields
-        from antdrive.sim.scenario import Scenario
 
         auto = self.settings.get("margin") == "auto" and "margin" not in made
         with placed(at):

@@ -9,7 +9,7 @@ import pyarrow
 import pytest
 
 from antdrive.base.errors import InputError
-from antdrive.runs.campaigns import campaign, sweeping
+from antdrive.runs.campaigns import campaign, notation, sweeping  # noqa: F401
 from antdrive.runs.campaigns.results import SweepResults
 
 RUN = {"world": "world_0", "seed": 0, "map": "none", "robot": "jackal", "planner": "astar"}
@@ -31,7 +31,7 @@ def driven(monkeypatch, tmp_path, compiled):
             folder, pyarrow.Table.from_pylist([{**RUN, "arrival_s": 10.0, "barn": 0.5, **end} for end in ENDS]), 2
         )
 
-    # Both modules are imported above: one that is first imported here would keep what the other is given for the test.
+    # All three modules are imported above: one that is first imported here would keep what another is given for the test.
     monkeypatch.setattr(campaign, "make_campaign", lambda data, **_words: data)
     monkeypatch.setattr(sweeping, "sweep", sweep)
     return tmp_path

@@ -58,7 +58,7 @@ def test_every_metric_has_a_unit_and_a_definition(name):
     metric = METRICS[name]
     assert metric.name == name
     assert metric.definition.endswith(".")
-    units = {"turning_rad_per_m": "rad/m", "jerk_rms": "m/s^3", "explored_m2": "m^2"}
+    units = {"turning_rad_per_m": "rad/m", "jerk_rms": "m/s³", "explored_m2": "m²"}
     suffix = name.rpartition("_")[2]
     assert metric.unit == units.get(name, suffix if suffix in ("m", "s") else "1")
 

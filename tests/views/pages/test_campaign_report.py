@@ -241,6 +241,13 @@ def test_charts_need_no_optional_columns():
     assert campaign_charts(summarise(RunTable(bare), title="t"), label_styles("ab", "ab")) == []
 
 
+def test_times_that_are_all_zero_have_a_chart():
+    columns = made_up_columns({"a": Skill(1.0), "b": Skill(1.0)})
+    columns["plan_s"] = [0.0] * len(columns["plan_s"])
+    charts = campaign_charts(summarise(RunTable(columns), title="t"), label_styles("ab", "ab"))
+    assert "Distribution: planning time" in [chart.title for chart in charts]
+
+
 def test_styles_of_labels_differ_and_are_readable_on_their_ground():
     names = ["ants"] * 6 + ["aco-han"] * 3 + ["astar", "mmas", "plugin"]
     styles = label_styles([f"{name} {k}" for k, name in enumerate(names)], names)

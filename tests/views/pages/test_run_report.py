@@ -170,6 +170,7 @@ def test_a_genuine_run_is_shown_as_certified(small_run, tmp_path):
     text = reported(tmp_path / "runs", tmp_path)
     assert "1 / 1" in text
     assert "Certified collision-free: at least" in text
+    assert "<dt>explored_m2</dt><dd>–</dd>" in text, "a robot with a map explores nothing"
     assert "result.json: belongs to another log" not in text
     write_run(small_run, tmp_path / "others" / "a", digest="0" * 64)
     assert "result.json: belongs to another log: its digest differs" in reported(tmp_path / "others", tmp_path)
@@ -299,6 +300,15 @@ def fake_run(folder, *, outcome="succeeded", **more):
     facts = {"world": "w", "planner": "astar", "robot": "turtlebot", "seed": 0, "command": "antdrive run w"}
     (folder / "result.json").write_text(json.dumps({**facts, "outcome": outcome, **more}))
     (folder / "a film.mp4").write_bytes(b"film")
+
+
+def test_sections_are_headed_by_their_run_and_what_else_differs(tmp_path):
+    fake_run(tmp_path / "runs" / "a", noise=0.0)
+    fake_run(tmp_path / "runs" / "b", noise=0.5, robot="jackal")
+    page, text = (reported(tmp_path / "runs", tmp_path, kind) for kind in ("html", "md"))
+    wanted = ["w · astar · turtlebot · seed 0 · noise 0", "w · astar · jackal · seed 0 · noise 0.5"]
+    assert re.findall(r"</span>(w · .*?)</h2>", page) == wanted
+    assert re.findall(r"<summary>(.*?):", text) == wanted
 
 
 def test_the_markdown_of_300_runs_is_short_with_failures_first(tmp_path):

@@ -109,6 +109,7 @@ def test_markdown_lists_failures_with_their_commands_and_stays_short(tmp_path):
     assert "76 more rows are in the page" in text
     tables = [line for line in text.splitlines() if line.startswith("|")]
     assert len(tables) == 4 * 2 + 17 + 17 + 60 + 60
+    assert "smallest distance" not in text, "a note on a column of the table of runs, which only the page has"
 
 
 def test_notes_state_the_limits_of_the_tables(tmp_path):

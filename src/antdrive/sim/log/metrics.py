@@ -293,13 +293,13 @@ _TABLE = (
     Metric("s", plan_s, "lower", proof="clock"),
     Metric("s", drive_wall_s, "lower", proof="clock"),
     Metric("rad/m", turning_rad_per_m, "lower", Tolerance(0.02, 0.05)),
-    Metric("m/s^3", jerk_rms, "lower", Tolerance(0.1, 0.1)),
+    Metric("m/s³", jerk_rms, "lower", Tolerance(0.1, 0.1)),
     Metric("1", contacts_driving, "lower", Tolerance()),
     Metric("1", contacts_standing, "lower", Tolerance()),
     Metric("1", contacts_teleported, "lower", Tolerance()),
     Metric("1", replans),
     Metric("s", avoiding_s),
-    Metric("m^2", explored_m2),
+    Metric("m²", explored_m2),
 )
 
 #: Metrics by name.

@@ -30,7 +30,6 @@ from antdrive.robots.spec import Odometry, RobotSpec
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.policy import Perception
 from antdrive.sim.settings import SETTINGS
-from antdrive.sim.written import Written
 from antdrive.worlds.files.world_file import task_from_dict, task_to_dict
 from antdrive.worlds.limits import MAX_COORDINATE
 from antdrive.worlds.route import LEAD, end_reach
@@ -244,16 +243,6 @@ def _to_task(value: Any) -> Task:
     return task_from_dict(value, "task")
 
 
-def _to_written(value: Any) -> Written:
-    if not isinstance(value, Mapping):
-        raise ValueError(f"must be an object as in a suite, got {_shown(value)}")
-    from antdrive.sim.forms import require_settings  # which reads records
-
-    written = Written.read(value)
-    require_settings(written.settings)
-    return written
-
-
 def _to_outcome(value: Any) -> Outcome:
     return Outcome.from_key(value if isinstance(value, str) else _shown(value))
 
@@ -337,9 +326,7 @@ class DriveRecord:
     footprint_margin: float | None = dataclasses.field(default=None, metadata=LATER | REPLAYED)
     asked_cell: float | None = dataclasses.field(default=None, metadata=LATER | CHOSEN)
     physics: str = dataclasses.field(default="", metadata=LATER | REPLAYED)
-    written: Annotated[Written | None, PlainValidator(_to_written)] = dataclasses.field(
-        default=None, metadata=LATER | CLAIMED
-    )
+    written: Mapping[str, Any] | None = dataclasses.field(default=None, metadata=LATER | CLAIMED)
     digest: str | None = dataclasses.field(default=None, metadata=LOGGED)
 
     def __post_init__(self) -> None:
@@ -507,8 +494,6 @@ def plain_value(value: Any) -> Any:
         return value.key
     if isinstance(value, Task):
         return task_to_dict(value)
-    if isinstance(value, Written):
-        return settings_of(value.plain())
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = [(field, getattr(value, field.name)) for field in dataclasses.fields(value)]
         said = ((field, v) for field, v in fields if not (field.metadata.get("omit_if_default") and v == field.default))

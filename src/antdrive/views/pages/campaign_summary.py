@@ -37,9 +37,9 @@ TITLES = {
     "plan_s": "planning time",
     "drive_wall_s": "wall time of the drive",
     "path_length_m": "planned length",
-    "bound_m": "proved clearance",
+    "bound_m": "certified clearance",
 }
-UNITS = ("_rad_per_m", "_m2", "_m", "_s")  # suffixes of names
+UNITS = ("_rad_per_m", "_m2", "_m", "_s", "_hz")  # suffixes of names
 
 
 @dataclass(frozen=True, eq=False)

@@ -104,7 +104,7 @@ def _distribution(name: str, curves: Sequence[StepCurve], count: int, styles: Se
         values = np.concatenate([curve.x for curve in curves])
         low, high = float(values.min()), float(values.max())
         log = low > 0 and high > 20 * low
-        _steps(axes, curves, styles, low / 1.1 if log else 0.0, high * 1.05, log=log)
+        _steps(axes, curves, styles, low / 1.1 if log else 0.0, 1.05 * high or 1.0, log=log)
         axes.set(xlabel=measure_title(name), ylabel="fraction of instances")
 
     note = f"Fraction of {count} instances that a planner solves with at most x. Failures count as unsolved."
@@ -328,7 +328,7 @@ def _svg(figure: Figure, styles: Sequence[LabelStyle]) -> str:
     text = re.sub(r' (?:width|height)="[\d.]+pt"', "", text, count=2)
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r' id="planner-(\d+)"', r' class="planner-\1"', text)
-    text = re.sub(r' id="\w+_\d+"', "", text)  # ids would repeat in every chart
+    text = re.sub(r' id="[\w.]+_\d+"', "", text)  # ids would repeat in every chart
     colours = {style.light: f"--planner-{k}" for k, style in enumerate(styles)} | PAGE_COLOURS
     return re.sub("#[0-9a-f]{6}", lambda match: f"var({colours[match[0]]})" if match[0] in colours else match[0], text)
 

@@ -86,7 +86,7 @@ def shown(value: Any, longest: int = LONGEST) -> str:
     """Format a value as one line of printable characters, cut to a length."""
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if value is None:
+    if value is None or value != value:
         return NONE
     if isinstance(value, float):
         return f"{value:.6g}"

@@ -126,6 +126,14 @@ class Report:
         names = ("world", "planner", *self.differing, "outcome", "test", "seed", *MEASURED)
         return [name for name in names if any(value is not None for value in self.table.columns.get(name, ()))]
 
+    def heading(self, run: ReportedRun) -> str:
+        """Return the heading of a run's section: the run, and its settings that differ from another run's."""
+        settings = [name for name in self.differing if name != "robot" and not name.startswith("option.")]
+        known = [f"{measure_title(name)} {shown(run.row[name])}" for name in settings if run.row[name] is not None]
+        return " · ".join(
+            [*(str(run.row[name]) for name in ("world", "planner", "robot")), f"seed {run.row['seed']}", *known]
+        )
+
     def write(self, out: Path, columns: Sequence[str] = ()) -> list[Path]:
         """Write the report in the format of the file's suffix, a campaign's tables with these columns; return the files.
 
@@ -437,5 +445,5 @@ def _common(report: Report) -> dict[str, Any]:
         "column_notes": [
             (measure_title(name), note) for name, note in MEASURED.items() if note and name in report.shown
         ],
-        "heading": [(name, measure_title(name)) for name in report.differing if not name.startswith("option.")],
+        "heading": report.heading,
     }

@@ -27,7 +27,7 @@ from antdrive.views.pages.rendering import number, shown
 LONGEST_COMMAND = 4000  # characters
 LISTED_SIGHTS = 40  # number of listed cylinders, those with the closest approaches
 UNDRIVEN = (Outcome.NO_PATH.key, Outcome.STOPPED.key)  # outcomes of runs without a log
-CONTACT = (Outcome.COLLIDED.key, Outcome.INVALID_PLAN.key)  # outcomes with a red badge
+RED = (Outcome.COLLIDED.key, Outcome.INVALID_PLAN.key)  # outcomes with a red badge
 REQUIRED = ("world", "planner", "robot", "seed", "outcome")  # keys of result.json
 WRITTEN = tuple(name for name, fact in FACTS.items() if fact.proof == "written")
 #: Columns of settings, as in a campaign's table, by their keys in result.json; and the defaults of those in `settings`.
@@ -68,7 +68,7 @@ class ReportedRun:
     @property
     def badge(self) -> str:
         """The CSS class of the outcome's badge."""
-        return "good" if self.row["succeeded"] else "hit" if self.row["outcome"] in CONTACT else ""
+        return "good" if self.row["succeeded"] else "hit" if self.row["outcome"] in RED else ""
 
 
 def find_runs(folder: Path) -> Iterator[ReportedRun]:

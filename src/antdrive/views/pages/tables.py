@@ -219,7 +219,7 @@ def latex_text(text: str) -> str:
     """Escape a text for LaTeX."""
     special = {
         "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "–": "--", "<": r"$<$",
-        ">": r"$>$", "²": r"\textsuperscript{2}", "∞": r"$\infty$", "·": r"$\cdot$",
+        ">": r"$>$", "²": r"\textsuperscript{2}", "³": r"\textsuperscript{3}", "∞": r"$\infty$", "·": r"$\cdot$",
     }  # fmt: skip
-    text = re.sub(r"[\\~^–<>²∞·&%$#_{}]", lambda found: special.get(found[0], "\\" + found[0]), text)
+    text = re.sub(r"[\\~^–<>²³∞·&%$#_{}]", lambda found: special.get(found[0], "\\" + found[0]), text)
     return re.sub(r"(?<![\w.])-(?=\d)", "$-$", text)

@@ -1,3 +1,0 @@
-"""The pytest plugin's former name."""
-
-pytest_plugins = ["antdrive.testing.plugin"]
