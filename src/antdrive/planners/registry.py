@@ -77,13 +77,22 @@ def load_planner(name: str, home: Path | None = None, /, **options: Any) -> Plan
 
 
 def recorded_planner(name: str, /, **options: Any) -> Planner:
-    """Return the planner with a name in a record: a registered one, or one of user code that this process has loaded."""
-    own = name not in PLANNERS and name in LOADED
-    return (
-        _with_options(name, _instance(LOADED[name], f"planner {name!r}"), options)
-        if own
-        else load_planner(name, **options)
-    )
+    """Return the planner with a name in a record: one of user code that this process has loaded, or a registered one."""
+    if name not in PLANNERS and name in LOADED:
+        return _with_options(name, _instance(LOADED[name], f"planner {name!r}"), options)
+    return load_planner(registered_name(name), **options)
+
+
+def registered_name(name: str) -> str:
+    """Return the registered name of a record's planner, which may be that of its class."""
+    known = list_planners()
+    named = [key for key, planner in known.items() if name in (key, type(planner).__name__)]
+    if not named:
+        raise InputError(
+            f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; name its class "
+            f"(--planner FILE.py:CLASS), or register it under the entry point antdrive.planners"
+        )
+    return name if name in named else named[0]
 
 
 def planner_version(name: str) -> str:

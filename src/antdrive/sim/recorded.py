@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import FieldError, InputError
-from antdrive.planners import PLANNERS, Planner, list_planners, load_planner
+from antdrive.planners import PLANNERS, Planner, load_planner
+from antdrive.planners.registry import registered_name
 from antdrive.planners.user_code import is_user_code, record_name
 from antdrive.robots import list_robots
 from antdrive.sim.forms import require_settings, scenario_fields, written
@@ -121,7 +122,7 @@ def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenar
             )
         word = planner
     elif planner is None:
-        word = made["planner_name"] = _registered(name)
+        word = made["planner_name"] = registered_name(name)
     else:
         word, made["planner"] = "", planner
     try:
@@ -136,18 +137,6 @@ def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenar
         return FieldError(key if key.startswith("planner") else f"record.{key}", problem).as_input()
 
     return words.scenario(at=at, **made)
-
-
-def _registered(name: str) -> str:
-    """Return the registered name of a record's planner, which may be that of its class."""
-    known = list_planners()
-    named = [key for key, planner in known.items() if name in (key, type(planner).__name__)]
-    if not named:
-        raise InputError(
-            f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; name its class "
-            f"(--planner FILE.py:CLASS), or register it under the entry point antdrive.planners"
-        )
-    return name if name in named else named[0]
 
 
 def _settings_in_force(record: DriveRecord) -> dict[str, Any]:
