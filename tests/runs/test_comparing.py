@@ -75,6 +75,11 @@ def test_invalid_arguments_are_named(small_task, planners, more, key):
     assert told.value.key == key
 
 
+def test_one_planner_is_named_as_one(small_task):
+    with pytest.raises(FieldError, match="needs two or more, got astar"):
+        antdrive.compare(small_task, "astar")
+
+
 def test_a_planner_object_is_called_by_its_class(small_task):
     made = antdrive.compare(small_task, ["astar", PLANNERS["dijkstra"]])
     assert made.labels == ("astar", "Dijkstra")

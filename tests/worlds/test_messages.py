@@ -160,7 +160,8 @@ def test_invalid_worlds_are_refused_in_one_line(tmp_path, monkeypatch, data_regr
         "rows": {str(row): lambda r=row: rows(r) for row in ([1.0, 2.0, 0.0], [math.nan, 2.0, 1.0])},
         "forests": {str(options): lambda o=options: forest(rng(0), **o) for options in FORESTS},
         "barns": {str(options): lambda o=options: barn(rng(0), **o) for options in BARNS},
-        "generated": {str(words): lambda w=words: generate(w[0], rng(0), w[1]) for words in GENERATED},
+        "generated": {str(words): lambda w=words: generate(w[0], rng(0), w[1]) for words in GENERATED}
+        | {f"forest of seed {seed!r}": lambda s=seed: generate("forest", s) for seed in ("a", -1)},
         "ends on maps": {str(words): lambda w=words: map_task(MAP, *w[:2], name="m", overhang=w[2]) for words in ENDS},
         "posts": {"too many": posts},
         "resolutions": {str(r): lambda r=r: cell_map(ROOM, r) for r in (0.0, -1.0, math.nan, math.inf, 1e-5)},

@@ -284,6 +284,7 @@ def compare(
     from antdrive.sim.scenario import Scenario
 
     places = [worlds] if not isinstance(worlds, Sequence) or isinstance(worlds, str) else list(worlds)
+    planners = [planners] if isinstance(planners, str) else planners
     listed = [] if isinstance(planners, Mapping) else [(_name_of(one), one) for one in planners]
     named = dict(planners if isinstance(planners, Mapping) else listed)
     if len(named) < len(listed):

@@ -110,6 +110,8 @@ class Scenario(Settings):
 
     def _check_kinds(self) -> None:
         """Raise FieldError for objects of the wrong type."""
+        if self.planner is None or issubclass(type(self.planner), type):
+            raise FieldError("planner", f"must be a planner, such as AStar(), got {self.planner!r:.60}")
         kinds: dict[str, type] = {"task": Task, "robot": RobotSpec, "perception": Perception, "unseen": tuple}
         kinds |= {name: type(SETTINGS[name].default) for name in ("controller", "avoidance", "replanning")}
         for name, kind in kinds.items():

@@ -285,7 +285,11 @@ def generate(
             raise input_error(kind, key, f"unknown option; choose from {', '.join(defaults)}")
         values[key] = _value(kind, key, text, defaults[key])
     try:
-        task = GENERATORS[kind](np.random.default_rng(seed), **values)
+        rng = np.random.default_rng(seed)
+    except (TypeError, ValueError):
+        raise input_error(kind, "seed", f"must be a whole number of at least 0, got {seed!r:.60}") from None
+    try:
+        task = GENERATORS[kind](rng, **values)
     except FieldError as error:
         raise input_error(kind, *([error.key] if error.key != kind else []), error.problem) from None
     source = "; ".join(part for part in (task.world.source, note) if part)
