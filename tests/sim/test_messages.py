@@ -31,8 +31,9 @@ RATES = (
 SETTINGS = (
     {"seed": "a"}, {"seed": -1}, {"seed": 1.5}, {"seed": True}, {"margin": "0.1"}, {"margin": -0.1}, {"noise": None},
     {"cell": "fine"}, {"unseen": [Disc(3, 3, 0.2)]}, {"unseen": ((3, 3, 0.2),)}, {"perception": "positions"},
-    {"avoidance": False}, {"replanning": True}, {"controller": None}, {"planner": None}, {"planner": Disc}, {"task": "forest"}, {"robot": "jackal"},
+    {"avoidance": False}, {"replanning": True}, {"controller": None}, {"task": "forest"}, {"robot": "jackal"},
     {"time_limit": "long"}, {"map": "some"}, {"localisation": "gps"}, {"odometry": -1.0}, {"localisation": "matching"},
+    {"planner": None}, {"planner": Disc},
 )  # fmt: skip
 #: Places in a record and what is written there; None: the key is left out.
 RECORDS = (

@@ -129,8 +129,8 @@ def _parameter(
     if many:
         kind, default = list[kind], None
     repeated = " Repeatable." if many or setting.form == "discs" else ""
-    said = usual.get(one.name, setting.usual)
-    shown = f"  [default: {said}]" if said and not many else ""
+    text_of_default = usual.get(one.name, setting.usual)
+    shown = f"  [default: {text_of_default}]" if text_of_default and not many else ""
     made = option(setting.metavar, f"{text}.{repeated}{shown}", flags, panel=setting.group)
     annotation: Any = Annotated[kind | None if default is None else kind, made]
     return inspect.Parameter(one.key, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

@@ -80,7 +80,7 @@ class Scenario(Settings):
         robot: the robot's specification
         planner_name: the planner's name in records; empty: its class name
         margin_choice: how the margin was chosen; None: it was given
-        said: the words for task, planner and robot, each with the object that it stood for, which may have been replaced
+        named_as: the words for task, planner and robot, each with its object, which may have been replaced since
 
     Raises:
         ValueError: a setting is out of range, or the robot's footprint overlaps an obstacle or a wall at the start.
@@ -91,7 +91,7 @@ class Scenario(Settings):
     robot: RobotSpec
     planner_name: str = ""
     margin_choice: MarginChoice | None = None
-    said: Mapping[str, tuple[Any, Mapping[str, Any]]] = dataclasses.field(default_factory=dict, compare=False)
+    named_as: Mapping[str, tuple[Any, Mapping[str, Any]]] = dataclasses.field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         self._check_kinds()

@@ -32,8 +32,8 @@ def placed(at: ErrorAt | None) -> Iterator[None]:
     try:
         yield
     except (FieldError, InputError) as error:
-        said = isinstance(error, InputError) and not error.key  # the message has a place
-        raise error if at is None or said else at(error.key, error.problem) from None
+        has_place = isinstance(error, InputError) and not error.key
+        raise error if at is None or has_place else at(error.key, error.problem) from None
 
 
 def unchosen(s: Scenario) -> Scenario:
@@ -159,8 +159,8 @@ class Written:
             options = {key: getattr(fields["planner"], key, value) for key, value in self.options.items()}  # not text
             here = dataclasses.replace(here, options=options)
             words = {"task": here.world, "planner": here.planner, "robot": here.robot}
-            said = {name: (fields[name], here._words(name)) for name, word in words.items() if word}
-            s = Scenario(**fields, said=said)
+            named = {part: (fields[part], here._words_of(part)) for part, word in words.items() if word}
+            s = Scenario(**fields, named_as=named)
             return choose(s) if auto else s
 
     def check_names(self, home: Path | None, at: ErrorAt) -> None:
@@ -210,10 +210,10 @@ class Written:
         except InputError as error:
             raise FieldError("world", str(error)) from None
 
-    def _words(self, name: str) -> dict[str, Any]:
-        """Return the fields that name a scenario's task, planner or robot."""
+    def _words_of(self, part: str) -> dict[str, Any]:
+        """Return the fields that name a part of a scenario: its task, planner or robot."""
         keys = {"task": ("world", "task", "start", "goal"), "planner": ("planner", "options"), "robot": ("robot",)}
-        return {key: getattr(self, key) for key in keys[name]}
+        return {key: getattr(self, key) for key in keys[part]}
 
     @classmethod
     def of(cls, s: Scenario) -> Written:
@@ -225,9 +225,9 @@ class Written:
         from antdrive.sim.forms import written
 
         words: dict[str, Any] = {}
-        for name, named in (("task", named_task), ("planner", named_planner), ("robot", named_robot)):
-            made, said = s.said.get(name, (None, {}))
-            words |= said if made is getattr(s, name) else named(getattr(s, name), s.planner_label)
+        for part, named in (("task", named_task), ("planner", named_planner), ("robot", named_robot)):
+            made, known = s.named_as.get(part, (None, {}))
+            words |= known if made is getattr(s, part) else named(getattr(s, part), s.planner_label)
         settings = written(lambda name: getattr(s, name)) | ({} if s.chosen is None else {"margin": "auto"})
         return cls(**words, settings={key: value for key, value in settings.items() if key != "seed"}, seed=int(s.seed))
 

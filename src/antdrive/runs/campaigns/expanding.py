@@ -62,8 +62,8 @@ class Expansion:
             missing: number of runs that are not done
         """
         smoothings = dict.fromkeys(str(job.case.resolved.columns["smoothing"]) for job in self.jobs)
-        said = {"smoothing": f"smoothing {', '.join(smoothings)}"}
-        yield " x ".join(said.get(name) or _counted(name, count) for name, count in self.counts.items())
+        parts = {name: _counted(name, count) for name, count in self.counts.items()}
+        yield " x ".join((parts | {"smoothing": f"smoothing {', '.join(smoothings)}"}).values())
         omitted = f"; {self.duplicates} duplicate combinations omitted" if self.duplicates else ""
         yield f"{len(self.jobs)} runs, {missing} missing{omitted}"
 

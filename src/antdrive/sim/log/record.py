@@ -286,7 +286,8 @@ class DriveRecord:
         asked_cell: side of the cells that were asked for [m]; omitted where plans use these
         physics: which body of physics was not in the place of its obstacle, so that its contacts are no evidence; omitted
             where all were
-        written: the scenario in the keys of a suite, for commands; not covered by the digest; omitted in older logs
+        written: the scenario in the keys of a suite, for commands; not covered by the digest, `verify` compares it; omitted in
+            older logs
         digest: SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
 
     Raises:
