@@ -126,6 +126,15 @@ def test_the_key_of_a_scenario_is_that_of_its_run_in_a_campaign():
     assert job.key == "1a28ffe7640dffa2916b157f85401910", "as in folders written before"
 
 
+def test_a_planner_is_named_as_older_suites_do():
+    old = [{"file": "mine.py", "name": "Mine", "width": 2}, {"module": "mine", "name": "Mine", "width": 2}]
+    words = [Written.read({"world": "box.yaml", "planner": planner}) for planner in old]
+    assert [(one.planner, one.options) for one in words] == [
+        ("mine.py:Mine", {"width": 2}),
+        ("mine:Mine", {"width": 2}),
+    ]
+
+
 def test_parts_made_in_python_are_files_named_after_them():
     task = load_task("forest")
     s = Scenario(task=task, planner=AStar(), robot=Scenario.of("forest").robot)

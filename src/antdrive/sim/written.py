@@ -86,11 +86,8 @@ class Written:
         name = planner if isinstance(planner, str) else options.pop("name", None)
         if not isinstance(name, str):
             raise FieldError("planner.name", "missing; write the planner's name, or FILE.py:CLASS or MODULE:CLASS")
-        for key in ("file", "module"):
-            if key in options and ":" not in name:
-                raise FieldError(
-                    f"planner.{key}", f"no key of planners; write {options[key]}:{name} as the planner's name"
-                )
+        if source := options.pop("file", None) or options.pop("module", None):  # as older suites name their planners
+            name = f"{source}:{name}"
         settings = {key: value for key, value in data.items() if key not in own}
         known = {one.key for one in SETTINGS.values()}
         for key in settings:
