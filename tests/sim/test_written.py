@@ -133,6 +133,8 @@ def test_a_planner_is_named_as_older_suites_do():
         ("mine.py:Mine", {"width": 2}),
         ("mine:Mine", {"width": 2}),
     ]
+    of_today = Written.read({"world": "box.yaml", "planner": {"name": "mine.py:Mine", "file": "a.txt"}})
+    assert (of_today.planner, of_today.options) == ("mine.py:Mine", {"file": "a.txt"})
 
 
 def test_parts_made_in_python_are_files_named_after_them():

@@ -86,8 +86,8 @@ class Written:
         name = planner if isinstance(planner, str) else options.pop("name", None)
         if not isinstance(name, str):
             raise FieldError("planner.name", "missing; write the planner's name, or FILE.py:CLASS or MODULE:CLASS")
-        if source := options.pop("file", None) or options.pop("module", None):  # as older suites name their planners
-            name = f"{source}:{name}"
+        if ":" not in name and (source := options.pop("file", None) or options.pop("module", None)):
+            name = f"{source}:{name}"  # as older suites name their planners
         settings = {key: value for key, value in data.items() if key not in own}
         known = {one.key for one in SETTINGS.values()}
         for key in settings:
