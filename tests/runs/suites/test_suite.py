@@ -81,7 +81,7 @@ def test_a_suite_can_express_every_setting_of_a_scenario():
         "seed": "seeds",
         "planner_name": "planner",
         "margin_choice": "margin",
-        "said": "world",
+        "named_as": "world",
         "frame": "start",  # suites have places of the world itself
     }
     assert all(keys[field.name] in ScenarioEntry.model_fields for field in fields(Scenario))
