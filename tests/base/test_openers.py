@@ -41,7 +41,6 @@ ALLOWED = {
         *("arrow.parquet.read_metadata", "arrow.parquet.read_table"),
     },
     "runs/margins/choice.py": {"temporary.write_bytes"},
-    "runs/papers/paragraphs.py": {"Path(__file__).parent / folder / f'{paper}.csv'.open"},
     "runs/papers/reproduction.py": {"temporary.open", "path.read_bytes"},
     "sim/log/rollout.py": {"zipfile.ZipFile", "temporary.open"},
     "sim/physics/bullet.py": {"os.open"},
