@@ -41,6 +41,7 @@ ALLOWED = {
         *("arrow.parquet.read_metadata", "arrow.parquet.read_table"),
     },
     "runs/margins/choice.py": {"temporary.write_bytes"},
+    "runs/papers/claims.py": {"Path(__file__).parent / folder / f'{paper}.csv'.open"},
     "runs/papers/reproduction.py": {"temporary.open", "path.read_bytes"},
     "sim/log/rollout.py": {"zipfile.ZipFile", "temporary.open"},
     "sim/physics/bullet.py": {"os.open"},
