@@ -16,7 +16,7 @@ from antdrive.planners import AStar, load_planner
 from antdrive.robots import list_robots
 from antdrive.sim import Scenario, run
 from antdrive.sim.log.record import DriveRecord, settings_of
-from antdrive.sim.recorded import command_of, written_of
+from antdrive.sim.recorded import command_of, false_words, written_of
 from antdrive.sim.settings import LOCALISATIONS, SETTINGS, SMOOTHINGS
 from antdrive.sim.written import Written
 from antdrive.worlds import load_task
@@ -187,6 +187,7 @@ def test_a_log_with_words_that_are_none_has_no_command(small_run, words):
     with pytest.raises(FieldError):
         written_of(record)
     assert command_of(record) is None
+    assert len(list(false_words(record))) == 1
 
 
 def test_a_log_names_the_files_that_its_drive_was_given(tmp_path, monkeypatch):
@@ -199,3 +200,34 @@ def test_a_log_names_the_files_that_its_drive_was_given(tmp_path, monkeypatch):
         command_of(read)
         == "antdrive run empty --planner astar --robot robot.yaml --margin 0.1 --time-limit 0.5 --seed 0"
     )
+
+
+FORGED = {
+    "world": {"world": "office"},
+    "start": {"start": [1.5, 1.5, 1.0]},
+    "goal": {"world": "mine.yaml", "goal": [1.5, 2.5]},
+    "robot": {"robot": "jackal"},
+    "planner": {"planner": "mine.py:Mine", "options": {}},
+    "planner.ants": {"options": {"ants": 7}},
+    "seed": {"seed": 5},
+    "noise": {"settings": {"noise": 0.5}},
+    "margin": {"settings": {"margin": "auto"}},
+}
+
+
+@pytest.mark.parametrize("key", FORGED)
+def test_a_written_word_that_the_record_contradicts_is_named(key, small_run):
+    record = small_run.rollout.record
+    assert list(false_words(record)) == []
+    forged = dataclasses.replace(record, written=dataclasses.replace(written_of(record), **FORGED[key]).plain())
+    assert f"record.written.{key}:" in " ".join(false_words(forged))
+
+
+def test_a_mapless_drive_contradicts_no_word_of_its_own():
+    s = Scenario.of("slalom", "dstar-lite", map="none", localisation="odometry", time_limit=0.5)
+    assert list(false_words(run(s).rollout.record)) == []
+
+
+def test_settings_that_only_movers_bring_to_bear_are_unknown_without_any():
+    s = Scenario.of("empty", "astar", localisation="odometry", replanning=None, avoidance=None, time_limit=0.5)
+    assert list(false_words(run(s).rollout.record)) == []

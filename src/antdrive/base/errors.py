@@ -72,6 +72,11 @@ def few(items: Iterable[object], most: int = 4, between: str = ", ") -> str:
     return between.join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
+def amount(count: float, thing: str) -> str:
+    """Return a whole count with its noun, such as 1 run or 2 runs."""
+    return f"{count:.0f} {thing}{'' if count == 1 else 's'}"
+
+
 def require(
     key: str,
     value: float,

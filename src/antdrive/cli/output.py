@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from antdrive.base.errors import amount
 from antdrive.cli.console import bar, print_error, this_command
 from antdrive.cli.exits import INTERNAL_ERROR, SUCCEEDED
 from antdrive.runs.results_folder import free_folder, opened
@@ -53,7 +54,7 @@ def print_idle_settings(scenarios: Sequence[Scenario], given: Collection[str] = 
 def print_faults(faults: Mapping[str, int]) -> int:
     """Print errors of planners or antdrive with their numbers of runs on stderr. Return the exit code: success if none."""
     for message, runs in list(faults.items())[:MOST_FAULTS]:
-        print_error(f"{message} ({runs} run{'s' if runs > 1 else ''})")
+        print_error(f"{message} ({amount(runs, 'run')})")
     if len(faults) > MOST_FAULTS:
         print_error(f"{len(faults) - MOST_FAULTS} more errors in {sum(list(faults.values())[MOST_FAULTS:])} runs")
     return INTERNAL_ERROR if faults else SUCCEEDED

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import importlib.metadata
 import inspect
 import math
@@ -204,7 +205,7 @@ def _with_options(name: str, planner: Planner, options: Mapping[str, Any]) -> Pl
         return planner
     known = {f.name for f in _fields(planner)}
     with _loading(f"planner {name!r}", ""):
-        hints = typing.get_type_hints(type(planner)) if known else {}
+        hints = _hints(type(planner)) if known else {}
     values: dict[str, Any] = {}
     for key, value in options.items():
         if key not in known:
@@ -217,6 +218,12 @@ def _with_options(name: str, planner: Planner, options: Mapping[str, Any]) -> Pl
         raise error.under("planner").as_input() from None
     except ValueError as error:  # from a third-party planner
         raise _error("planner", one_line(str(error))) from None
+
+
+@functools.cache
+def _hints(kind: type) -> Mapping[str, Any]:
+    """Return the types of a class's fields; reading them compiles their text."""
+    return typing.get_type_hints(kind)
 
 
 def _fields(planner: Planner) -> tuple[dataclasses.Field[Any], ...]:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import FieldError, InputError
-from antdrive.planners import Planner, list_planners
+from antdrive.planners import PLANNERS, Planner, list_planners, load_planner
 from antdrive.planners.user_code import is_user_code, record_name
+from antdrive.robots import list_robots
 from antdrive.sim.forms import require_settings, scenario_fields, written
-from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.log.record import DriveRecord, settings_of
 from antdrive.sim.settings import SETTINGS
 from antdrive.sim.written import Written, named_planner, named_robot, named_task
+from antdrive.worlds import list_worlds
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -24,14 +27,14 @@ def written_of(record: DriveRecord) -> Written:
         FieldError: what the record holds as written is no scenario.
     """
     if record.written is not None:
-        said = Written.read(record.written)
-        require_settings(said.settings)
-        return said
+        words = Written.read(record.written)
+        require_settings(words.settings)
+        return words
     name = record.planner.name
-    words = (
+    parts = (
         named_task(record.task, name) | named_planner(record.planner.settings, name) | named_robot(record.robot, name)
     )
-    return Written(**words, settings=_settings_in_force(record), seed=record.seed)
+    return Written(**parts, settings=_settings_in_force(record), seed=record.seed)
 
 
 def command_of(record: DriveRecord) -> str | None:
@@ -40,6 +43,60 @@ def command_of(record: DriveRecord) -> str | None:
         return written_of(record).command()
     except (FieldError, InputError):
         return None
+
+
+def false_words(record: DriveRecord) -> Iterator[str]:
+    """Yield a sentence for every word in a log's written scenario that its record contradicts.
+
+    Neither files nor a user's code are read: what they hold is unknown.
+    """
+    if record.written is not None:
+        try:
+            for key in _contradicted(record, written_of(record)):
+                yield f"record.written.{key}: contradicts the rest of the record"
+        except (FieldError, InputError) as error:
+            yield str(FieldError(error.key, error.problem).under("record.written"))
+
+
+def _contradicted(record: DriveRecord, words: Written) -> Iterator[str]:
+    """Yield the key of every contradicted word.
+
+    Raises:
+        FieldError: a word has no meaning.
+    """
+    task, planner = record.task, record.planner
+    recorded: dict[str, Any] = {"world": task.world.name, "start": task.start, "goal": task.goal}
+    recorded |= {"planner": planner.name, "robot": record.robot.name, "seed": record.seed}
+    given: dict[str, Any] = {"planner": record_name(words.planner), "seed": words.seed}
+    given |= {key: tuple(getattr(words, key)) for key in ("start", "goal") if getattr(words, key) is not None}
+    if not isinstance(words.world, str):
+        given["world"] = f"{words.world['generate']}-{words.world.get('seed', 0)}"
+    elif words.world in list_worlds():
+        known = words.load_task()
+        given |= {"world": known.world.name, "start": known.start, "goal": known.goal}
+    if words.robot in list_robots():
+        given["robot"] = words.robot
+    yield from (key for key, value in given.items() if value != recorded[key])
+    options = words.options
+    if words.planner in PLANNERS:
+        options = settings_of(load_planner(words.planner, **options))
+    yield from (f"planner.{key}" for key, value in planner.settings.items() if options.get(key, value) != value)
+    if record.controller.name == "PurePursuit":
+        yield from _contradicted_settings(record, words.settings)
+
+
+def _contradicted_settings(record: DriveRecord, settings: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the key of every contradicted setting; those that act on movers alone may differ without any."""
+    chosen = settings.get("margin") == "auto" and record.margin_choice is not None
+    fields = scenario_fields({key: value for key, value in settings.items() if key != "margin" or not chosen})
+    given, in_force = written(fields.__getitem__), _settings_in_force(record)
+    unknown = {"seed"} | {key for key in ("margin", "cell", "time_limit", "sees") if key not in given}  # resolved
+    if record.perception is None or record.perception.kind == "motions":
+        unknown |= {"sees", "avoid"}
+    if record.perception is None and (record.sensing is None or record.sensing.map == "given"):
+        unknown.add("replan")
+    keys = (one.key for one in SETTINGS.values())
+    yield from (key for key in keys if key not in unknown and given.get(key) != in_force.get(key))
 
 
 def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenario:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from antdrive.base.errors import amount
 from antdrive.planners import PlanResult
 from antdrive.robots.default_margin import LEAST
 from antdrive.sim.pipeline import Run
@@ -25,7 +26,7 @@ def run_lines(run: Run) -> Iterator[str]:
             f"(route {facts['route_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
         )
         times, avoiding = facts["replans"], facts["avoiding_s"]
-        did = [f"replanned {times:.0f} time{'s' if times > 1 else ''}"] if times else []
+        did = [f"replanned {amount(times, 'time')}"] if times else []
         did += [f"avoided movers for {avoiding:.1f} s"] if avoiding else []
         if did:
             yield f"  {', '.join(did)}"

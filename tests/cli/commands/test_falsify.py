@@ -56,7 +56,7 @@ def test_failures_are_handed_over_as_a_suite(antdrive, planner):
 def test_a_set_up_without_failures_is_exit_code_0(antdrive):
     code, out, err = antdrive("falsify", "-p", "astar", "--budget", "1", "--out", "none")
     assert (code, err) == (0, "")
-    assert out == "after 1 runs (the robot drove in 1): 0 failures, 0 distinct\n"
+    assert out == "after 1 run (the robot drove in 1): 0 failures, 0 distinct\n"
     assert [path.name for path in Path("none").iterdir()] == ["falsify.json"]
 
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-from antdrive.base.errors import InputError
+from antdrive.base.errors import InputError, amount
 from antdrive.base.files import format_size
 from antdrive.base.tables import file_lines
 from antdrive.cli import options
@@ -62,7 +62,7 @@ def report(
         json,
         {"file": str(files[0]), "files": [str(path) for path in files], "runs": count, "bytes": size},
         [
-            f"{f'{count} run' + 's' * (count != 1) + ', ' if count else ''}{format_size(size)}",
+            ", ".join([*([amount(count, "run")] if count else []), format_size(size)]),
             *file_lines({**names, **({} if figures is None else {"figures": figures})}),
         ],
     )

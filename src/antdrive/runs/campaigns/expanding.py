@@ -12,7 +12,7 @@ from typing import Any
 
 from antdrive.base.checks import resolve, suggest
 from antdrive.base.document import Location
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, amount
 from antdrive.base.files import file_name
 from antdrive.robots import list_robots, load_robot
 from antdrive.runs.campaigns.campaign import AXES, Campaign
@@ -65,7 +65,7 @@ class Expansion:
         said = {"smoothing": f"smoothing {', '.join(smoothings)}"}
         yield " x ".join(said.get(name) or _counted(name, count) for name, count in self.counts.items())
         omitted = f"; {self.duplicates} duplicate combinations omitted" if self.duplicates else ""
-        yield f"{len(self.jobs)} runs, {missing} missing{omitted}"
+        yield f"{amount(len(self.jobs), 'run')}, {missing} missing{omitted}"
 
 
 def _counted(name: str, count: int) -> str:

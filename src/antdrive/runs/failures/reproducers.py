@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from antdrive.base.errors import amount
 from antdrive.base.tables import table
 from antdrive.runs.failures.failure import Attempt
 from antdrive.runs.failures.handover import Handover, renamed, run_elsewhere, write_suite
@@ -104,8 +105,8 @@ def failure_lines(hunt: Hunt, reported: Sequence[Reproducer], folder: Path, *, f
         filmed: whether they are filmed
     """
     ended = "interrupted after" if hunt.interrupted else "after"
-    runs = f"{hunt.runs} runs (the robot drove in {hunt.driven})"
-    yield f"{ended} {runs}: {len(hunt.findings)} failures, {len(hunt.distinct)} distinct"
+    runs = f"{amount(hunt.runs, 'run')} (the robot drove in {hunt.driven})"
+    yield f"{ended} {runs}: {amount(len(hunt.findings), 'failure')}, {len(hunt.distinct)} distinct"
     if reported:
         yield from table(("name", "run", "repeats", "obstacles", "failure"), (one.cells for one in reported))
         yield f"suite of the failures, {'with worlds, logs and films' if filmed else 'with worlds and logs'}: {folder}"

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.atomic import atomic_write, write_text
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, amount
 from antdrive.runs.statistics.comparison import SUCCESS, PairedComparison
 from antdrive.runs.statistics.success import PlannerSuccess
 from antdrive.views.pages.campaign_summary import CampaignSummary, measure_title
@@ -204,7 +204,7 @@ def _latex_table(table: TextTable, summary: CampaignSummary) -> list[str]:
         return " & ".join(latex_text(cell) for cell in cells) + r" \\"
 
     align = "".join("l" if heading in WORDS else "r" for heading in table.headings)
-    counts = f"{len(summary.table)} runs in {len(summary.paired.worlds)} worlds"
+    counts = f"{amount(len(summary.table), 'run')} in {amount(len(summary.paired.worlds), 'world')}"
     caption = f"\\caption{{{latex_text(f'{table.title} ({summary.title}: {counts}).')}}}"
     label = f"\\label{{tab:{re.sub('[^a-z0-9]+', '-', f'{summary.title} {table.title}'.lower()).strip('-')}}}"
     head, body = [r"\toprule", line(table.headings), r"\midrule"], [*map(line, table.rows), r"\bottomrule"]

@@ -129,7 +129,7 @@ def load_task(world: str | os.PathLike[str], name: str | None = None, home: Path
     if name not in tasks:
         known = [known for known in tasks if known is not None]
         hint = suggest(name or "", known) if known else "the world has no named tasks"
-        raise input_error(os.fspath(world), f"no task {name!r:.60}; {hint}")
+        raise InputError(visible(f"{os.fspath(world)}: no task {name!r:.60}; {hint}"), "task")
     return tasks[name]
 
 
