@@ -26,10 +26,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from antdrive.runs.campaigns import canonical_bytes, read_results
+from antdrive.runs.campaigns import read_results
 from antdrive.runs.campaigns.store import results_in
 from antdrive.worlds import Disc, Task, World, save_task
 from benchmarks.markdown import append_line, command_line, print_table, read_lines
+from tests.runs.canonical import canonical_bytes
 
 SMALLEST = ("--kills 1",)
 RUNS = 12

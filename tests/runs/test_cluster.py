@@ -10,13 +10,14 @@ from types import SimpleNamespace
 import pytest
 
 from antdrive.base.errors import InputError
-from antdrive.runs.campaigns import canonical_bytes, make_campaign, read_results
+from antdrive.runs.campaigns import make_campaign, read_results
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.running import finished_of, log_path
 from antdrive.runs.campaigns.sweeping import sweep
 from antdrive.runs.cluster import _received, run_chunk, run_on_cluster
 from antdrive.runs.pool import Ticket, Waiting
 from tests.runs.campaigns.works import Deadly, Endless, Refusing
+from tests.runs.canonical import canonical_bytes
 
 pytestmark = [
     pytest.mark.slow,  # starting a cluster takes seconds

@@ -36,9 +36,9 @@ class Document:
     """Plain data with the line number of each value."""
 
     source: str  # the file's path, or a name of the data
-    data: Any  # mappings, lists, numbers, texts, true, false and null
+    data: Any = field(repr=False)  # mappings, lists, numbers, texts, true, false and null
     # line of each value, from 1; empty if unknown
-    lines: Mapping[Location, int] = field(default_factory=dict)
+    lines: Mapping[Location, int] = field(default_factory=dict, repr=False)
 
     def error(self, location: Location, problem: str) -> InputError:
         """Return the error for a value: source, line if known, key and problem."""

@@ -73,7 +73,6 @@ class AgentStats:
     Attributes:
         steps: moves to another cell
         waits: decisions to wait
-        decisions: steps and waits
         propagated: cells that received pheromone, or that a search expanded
         cycles: cycles detected and broken
         length: length of the path so far [m]
@@ -83,7 +82,6 @@ class AgentStats:
 
     steps: int = 0
     waits: int = 0
-    decisions: int = 0
     propagated: int = 0
     cycles: int = 0
     length: float = 0.0
@@ -188,7 +186,6 @@ class SteppingAgent(abc.ABC):
             return None
         cells = np.asarray(blocked, dtype=np.int64).reshape(-1, 2)
         inside = ((cells >= 0) & (cells < self._query.grid.shape)).all(axis=1)
-        self.stats.decisions += 1
         to = self._decide(cells[inside & (cells != self._cell).any(axis=1)])
         if to is None:
             self.stats.waits += 1

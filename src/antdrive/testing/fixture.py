@@ -23,7 +23,7 @@ from antdrive.sim.rerun import fingerprint
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.settings import tested_settings
 from antdrive.testing.evaluation import Check, CheckResult, Update
-from antdrive.views.artefacts import Results, file_name
+from antdrive.views.artefacts import Results, portable_name
 from antdrive.worlds import Task, list_worlds
 
 
@@ -193,7 +193,7 @@ class DriveFixture:
         Args:
             name: the test's name, with the drive's name if it has one
         """
-        return self._file.parent / BASELINES / self._file.stem / f"{file_name(name)}.json"
+        return self._file.parent / BASELINES / self._file.stem / f"{portable_name(name)}.json"
 
     def _beside(self, name: str | Path, known: Mapping[str, Path]) -> str | Path:
         """Return a catalogue name, or the path of a file next to the test's file if it exists."""

@@ -55,9 +55,9 @@ class Results:
         try:
             parts = home.relative_to(self.root.resolve()).parts
         except ValueError:  # outside the project
-            parts = (f"{file_name(home.name or 'root')}-{zlib.crc32(os.fsencode(home)):08x}",)
+            parts = (f"{portable_name(home.name or 'root')}-{zlib.crc32(os.fsencode(home)):08x}",)
         stem = file.name.removesuffix(SUFFIX) if file.name.endswith(SUFFIX) else file.stem
-        return self.folder.joinpath(*map(file_name, (*parts, stem, name)))
+        return self.folder.joinpath(*map(portable_name, (*parts, stem, name)))
 
     def should_film(self, *, failed: bool) -> bool:
         """Return whether to film a test. Of the failed tests, only the first `MOST_FILMS` are filmed; each claims a place."""
@@ -75,7 +75,7 @@ def _claim(place: Path) -> bool:
     return True
 
 
-def file_name(name: str) -> str:
+def portable_name(name: str) -> str:
     """Return a name that every file system accepts, such as aisle-0 for aisle[0].
 
     Only names such as aisle[0] and aisle-0 collide; baselines hold their test's name, which prevents a mix-up.
@@ -89,7 +89,7 @@ def file_name(name: str) -> str:
 
 def default_folder(root: Path) -> Path:
     """Return the folder of a project's results in the user's cache, or a temporary folder if the cache is read-only."""
-    name = f"{file_name(root.name or 'root')}-{zlib.crc32(str(root).encode()):08x}"
+    name = f"{portable_name(root.name or 'root')}-{zlib.crc32(str(root).encode()):08x}"
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
     user = os.getuid() if hasattr(os, "getuid") else "user"
     for folder in (cache / "antdrive" / "results", Path(tempfile.gettempdir()) / f"antdrive-results-{user}"):

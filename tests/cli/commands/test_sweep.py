@@ -11,7 +11,8 @@ import pytest
 from antdrive.base.atomic import folder_lock
 from antdrive.cli.console import campaign_bar, duration
 from antdrive.cli.groups import _without_again
-from antdrive.runs.campaigns import canonical_bytes, read_results
+from antdrive.runs.campaigns import read_results
+from tests.runs.canonical import canonical_bytes
 
 CAMPAIGN = (
     "schema: 1\nworlds: [small.yaml]\nplanners:\n  - astar\n  - {name: aco-han, ants: [5, 10]}\nrollouts: failed\n"

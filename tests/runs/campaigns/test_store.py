@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import antdrive.robots
 from antdrive.base.errors import InputError
-from antdrive.runs.campaigns import canonical_bytes, read_results, store
+from antdrive.runs.campaigns import read_results, store
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.rows import failed_row, grid_table
@@ -24,6 +24,7 @@ from antdrive.runs.campaigns.store import parts_in
 from antdrive.runs.campaigns.sweeping import sweep
 from tests.runs.campaigns.parent import go
 from tests.runs.campaigns.works import Deadly
+from tests.runs.canonical import canonical_bytes
 
 JOBS = expand(make_campaign({"worlds": ["empty"], "planners": ["astar"], "seeds": 6})).jobs
 

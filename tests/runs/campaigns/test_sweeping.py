@@ -12,12 +12,13 @@ from antdrive import Rollout, Scenario, load_task, run
 from antdrive.base.errors import InputError
 from antdrive.planners import PlannerError
 from antdrive.robots import load_robot
-from antdrive.runs.campaigns import canonical_bytes, expand, job, make_campaign, read_results, running, sweep, sweeping
+from antdrive.runs.campaigns import expand, job, make_campaign, read_results, running, sweep, sweeping
 from antdrive.runs.campaigns.running import Driving, log_path
 from antdrive.runs.campaigns.sweeping import calibrated
 from antdrive.runs.margins.choice import Calibration
 from antdrive.worlds import Disc, Task, World, save_task
 from tests.runs.campaigns.works import Deadly
+from tests.runs.canonical import canonical_bytes
 
 TWO_BY_TWO = {"worlds": ["small.yaml", "other.yaml"], "planners": ["astar", {"name": "aco-han", "ants": 10}]}
 

@@ -16,7 +16,7 @@ from antdrive.runs.suites.evaluation import Divergence, distances, divergence, e
 from antdrive.runs.suites.nearest import first_contact, nearest_of
 from antdrive.sim.log.metrics import Tolerance
 from antdrive.sim.log.record import hashes_of
-from antdrive.views.artefacts import MOST_FILMS, Results, baseline_rollout, file_name, remove_artefacts
+from antdrive.views.artefacts import MOST_FILMS, Results, baseline_rollout, portable_name, remove_artefacts
 
 PLAIN = Demands()
 
@@ -326,7 +326,7 @@ def test_a_way_after_the_baselines_end_is_looked_at_although_it_comes_back(basel
 
 @given(st.lists(st.text(min_size=1), min_size=2, max_size=2, unique=True))
 def test_names_of_files_are_plain_and_differ_where_the_tests_differ(names):
-    first, second = map(file_name, names)
+    first, second = map(portable_name, names)
     assert first.isascii()
     assert not set("/\\\0: ") & set(first)
     assert first != second or {first} <= {name.replace("[", "-").replace("]", "") for name in names}

@@ -304,9 +304,12 @@ def fake_run(folder, *, outcome="succeeded", **more):
 
 def test_sections_are_headed_by_their_run_and_what_else_differs(tmp_path):
     fake_run(tmp_path / "runs" / "a", noise=0.0)
-    fake_run(tmp_path / "runs" / "b", noise=0.5, robot="jackal")
+    fake_run(tmp_path / "runs" / "b", noise=0.5, robot="jackal", settings={"odometry": 0.0})
     page, text = (reported(tmp_path / "runs", tmp_path, kind) for kind in ("html", "md"))
-    wanted = ["w · astar · turtlebot · seed 0 · noise 0", "w · astar · jackal · seed 0 · noise 0.5"]
+    wanted = [
+        "w · astar · turtlebot · seed 0 · noise 0 · odometry 1",
+        "w · astar · jackal · seed 0 · noise 0.5 · odometry 0",
+    ]
     assert re.findall(r"</span>(w · .*?)</h2>", page) == wanted
     assert re.findall(r"<summary>(.*?):", text) == wanted
 

@@ -6,7 +6,6 @@ from .expanding import expand as expand
 from .job import Job as Job
 from .job import SweepCase as SweepCase
 from .results import SweepResults as SweepResults
-from .results import canonical_bytes as canonical_bytes
 from .results import canonical_table as canonical_table
 from .results import read_results as read_results
 from .sweeping import sweep as sweep

@@ -154,19 +154,6 @@ def canonical_table(folder: str | Path) -> pyarrow.Table:
     return table.select(kept).sort_by("key").combine_chunks()
 
 
-def canonical_bytes(folder: str | Path) -> bytes:
-    """Return the canonical table in Arrow's stream format, for comparisons.
-
-    Args:
-        folder: the campaign's folder
-    """
-    arrow, table = parquet_library(), canonical_table(folder)
-    sink = arrow.BufferOutputStream()
-    with arrow.ipc.new_stream(sink, table.schema) as writer:
-        writer.write_table(table)
-    return bytes(sink.getvalue().to_pybytes())
-
-
 Columns = Mapping[str, Sequence[Any]]
 
 

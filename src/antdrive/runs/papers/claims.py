@@ -25,9 +25,6 @@ from antdrive.runs.statistics.intervals import Interval, means_by_world, medians
 from antdrive.runs.statistics.significance import wilcoxon
 from antdrive.sim.log.record import finite_or_none
 
-#: The margin of "no longer than" [points]: a small effect, A = 0.56 (Vargha & Delaney 2000), wins 56 : 44.
-SMALL_EFFECT = 12.0
-
 
 class Arm(NamedTuple):
     """One experiment of a paper: the names of the map and of the planner with its setting."""

@@ -392,29 +392,6 @@ def vacate(row: int, col: int, m: MapArrays) -> None:
 
 
 @leaf
-def forget(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed: Array) -> int:
-    """Free the occupied cells whose hits all lie within `radius` of (x, y); return the number of rows written to `changed`."""
-    m = MapArrays(*arrays)
-    count = 0
-    i = 0
-    while i < m.count[0]:
-        outside = False
-        for k in range(GRAINS * GRAINS):
-            if m.odds[i, k] > 0.0:
-                box = m.box[i, k]
-                dx, dy = 0.5 * (box[0] + box[2]) - x, 0.5 * (box[1] + box[3]) - y
-                outside = outside or math.hypot(dx, dy) > radius
-        if outside:
-            i += 1
-            continue
-        row, col = m.cells[i, 0], m.cells[i, 1]
-        vacate(row, col, m)
-        changed[count, 0], changed[count, 1] = row, col
-        count += 1
-    return count
-
-
-@leaf
 def take_as_free(
     x: float, y: float, radius: float, discs: Array, walls: Array, arrays: tuple[Array, ...], changed: Array
 ) -> int:

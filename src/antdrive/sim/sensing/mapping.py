@@ -192,16 +192,6 @@ class OccupancyMap:
         discs: Floats = kernels.discs_within(*(within or EVERYWHERE), self.plain)
         return discs
 
-    def clear_hits(self, place: Point, radius: float) -> Cells:
-        """Mark hits around a position as free ground after a mover has left, and return the cells (K, 2).
-
-        Args:
-            place: x, y [m]
-            radius: distance around it [m]
-        """
-        count = kernels.forget(*place, radius, self.plain, self._changed)
-        return self._changed[:count].copy()
-
     def mark_free(self, place: Point, radius: float, world: World | None = None, movers: Floats | None = None) -> Cells:
         """Mark unknown ground as free, such as that under the robot, and return the cells (K, 2).
 

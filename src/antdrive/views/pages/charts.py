@@ -33,10 +33,8 @@ CURVE_POINTS = 400  # per curve, at most
 PROFILED = ("driven_length_m", "plan_s")
 DISTRIBUTED = ("duration_s", "plan_s")
 BOXED = ("plan_s", "gap_to_grid_optimum")
-AREA, OPTIMUM = (
-    "area_m2",
-    "grid_optimum_m",
-)  # columns that measure a world's size; the second is used if all areas are equal
+#: Columns that measure a world's size; the second is used if all areas are equal.
+AREA, OPTIMUM = "area_m2", "grid_optimum_m"
 #: CSS variables that replace the colours of the canvas's style.
 PAGE_COLOURS = {hexed(INK): "--ink", hexed(MUTED): "--muted", "#aab2bf": "--axis", "#e6e9ee": "--line"}
 

@@ -73,7 +73,7 @@ MEASURED: Mapping[str, str] = MappingProxyType(
         "duration_s": "",
         "min_clearance_m": "smallest distance to an obstacle at any logged pose",
         "bound_m": "clearance guaranteed by the certificate, including between logged poses",
-        "plan_s": "wall time of planning, with loaded kernels",
+        "plan_s": "wall time of planning, without compiling and loading kernels",
         "explored_m2": "area scanned by a mapless robot's lidar at any range; its occupancy map covers less",
     }
 )

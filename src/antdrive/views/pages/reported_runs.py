@@ -193,7 +193,7 @@ def _row(facts: Mapping[str, Any], faults: Sequence[str]) -> dict[str, Any]:
         "test": "test failed" if faults else None,
         "reason": shown(facts.get("reason") or "") or None,
         **{column: _plain(facts.get(key)) for key, column in COLUMNS.items()},
-        **{key: _plain(sensed.get(key) or usual) for key, usual in SENSED.items()},
+        **{key: _plain(sensed.get(key, usual)) for key, usual in SENSED.items()},
         **{metric: number(metrics.get(metric)) for metric in METRICS},
     }
 
