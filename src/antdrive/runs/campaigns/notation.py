@@ -109,6 +109,10 @@ def _planners(names: Sequence[str], settings: Sequence[str]) -> list[Any]:
     """Parse the campaign key `planners` from names and `--set NAME.KEY=VALUES`, where VALUES are 10,50 or 10..50..20."""
     if settings and not names:
         raise InputError(f"--set {settings[0]}: needs --planner")
+    for name in names:
+        if "=" in name:
+            planner = name.partition(":")[0]
+            raise InputError(f"--planner {name}: must be a planner's name; write its options as --set {planner}.KEY=VALUES")
     options: dict[str, dict[str, Any]] = {name: {} for name in names}
     for text in settings:
         group, key, values = grouped(text, (*map(record_name, names), "planner"))
