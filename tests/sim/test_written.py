@@ -223,6 +223,7 @@ def test_a_written_word_that_the_record_contradicts_is_named(key, small_run):
     assert list(false_words(record)) == []
     forged = dataclasses.replace(record, written=dataclasses.replace(written_of(record), **FORGED[key]).plain())
     assert f"record.written.{key}:" in " ".join(false_words(forged))
+    assert command_of(forged) is None
 
 
 def test_a_mapless_drive_contradicts_no_word_of_its_own():

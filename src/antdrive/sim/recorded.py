@@ -39,9 +39,9 @@ def written_of(record: DriveRecord) -> Written:
 
 
 def command_of(record: DriveRecord) -> str | None:
-    """Return the `antdrive run` command of a log's scenario; None if a setting has no option."""
+    """Return the `antdrive run` command of a log's scenario; None if a setting has no option, or a word is false."""
     try:
-        return written_of(record).command()
+        return None if any(false_words(record)) else written_of(record).command()
     except (FieldError, InputError):
         return None
 
