@@ -112,7 +112,9 @@ def _planners(names: Sequence[str], settings: Sequence[str]) -> list[Any]:
     for name in names:
         if "=" in name:
             planner = name.partition(":")[0]
-            raise InputError(f"--planner {name}: must be a planner's name; write its options as --set {planner}.KEY=VALUES")
+            raise InputError(
+                f"--planner {name}: must be a planner's name; write its options as --set {planner}.KEY=VALUES"
+            )
     options: dict[str, dict[str, Any]] = {name: {} for name in names}
     for text in settings:
         group, key, values = grouped(text, (*map(record_name, names), "planner"))
