@@ -43,8 +43,8 @@ WRONG = (
     "schema: 1\nworlds: [empty]\nplanners:\n  - {ants: 10}\n",
 )  # fmt: skip
 WRONG_BELOW_THE_HEAD = (
-    "planers: [astar]", "seeds: 0", "seeds: [1, 1]", "seeds: many", "smoothing: [tout]", "noise: [-1]", "noise: 1000",
-    "margin: wide", "robots: jakal", "rollouts: some", "tasks: twice", "tasks:\n  random: 0",
+    "planers: [astar]", "cell: 0.1", "seeds: 0", "seeds: [1, 1]", "seeds: many", "smoothing: [tout]", "noise: [-1]",
+    "noise: 1000", "margin: wide", "robots: jakal", "rollouts: some", "tasks: twice", "tasks:\n  random: 0",
     "tasks: {random: 2, min_distance: 99}", "tasks:\n  - {start: [1, 1, 0]}",
     "tasks:\n  - {start: [1, 1, 0], goal: [99, 1]}", "settings: {cell: []}", "settings: {cell: [0.1, 0]}",
     "settings: {physics_hz: 20}", "settings: {controller: {lokahead: 1.0}}",

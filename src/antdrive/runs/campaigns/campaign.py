@@ -288,6 +288,8 @@ def _plain(value: Any) -> Any:
 
 
 def _checked(document: Document, folder: Path) -> Campaign:
+    for key in SettingsEntry.model_fields.keys() & (document.data if isinstance(document.data, dict) else ()):
+        raise document.error((key,), "unknown key; write it under settings")
     entry = check(CampaignFile, document)
     settings, places = zip(*_settings(document, entry.settings), strict=True)
     if isinstance(entry.tasks, dict):
