@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import FieldError, InputError
@@ -41,33 +41,41 @@ def written_of(record: DriveRecord) -> Written:
 def command_of(record: DriveRecord) -> str | None:
     """Return the `antdrive run` command of a log's scenario; None if a setting has no option, or a word is false."""
     try:
-        return None if any(false_words(record)) else written_of(record).command()
+        false = [*false_words(record), *false_settings(record)]
+        return None if false else written_of(record).command()
     except (FieldError, InputError):
         return None
 
 
 def false_words(record: DriveRecord) -> Iterator[str]:
-    """Yield a sentence for every word in a log's written scenario that its record contradicts.
+    """Yield a sentence for every name, place and seed in a log's written scenario that its record contradicts.
 
     Neither files nor a user's code are read: what they hold is unknown.
     """
+    return _sentences(record, _contradicted_names)
+
+
+def false_settings(record: DriveRecord) -> Iterator[str]:
+    """Yield a sentence for every setting and option in a log's written scenario that its record contradicts.
+
+    Their defaults are those of planners and controllers, which load the compiler.
+    """
+    return _sentences(record, _contradicted_settings)
+
+
+def _sentences(record: DriveRecord, contradicted: Callable[[DriveRecord, Written], Iterator[str]]) -> Iterator[str]:
     if record.written is not None:
         try:
-            for key in _contradicted(record, written_of(record)):
+            for key in contradicted(record, written_of(record)):
                 yield f"record.written.{key}: contradicts the rest of the record"
         except (FieldError, InputError) as error:
             yield str(FieldError(error.key, error.problem).under("record.written"))
 
 
-def _contradicted(record: DriveRecord, words: Written) -> Iterator[str]:
-    """Yield the key of every contradicted word.
-
-    Raises:
-        FieldError: a word has no meaning.
-    """
-    task, planner = record.task, record.planner
+def _contradicted_names(record: DriveRecord, words: Written) -> Iterator[str]:
+    task = record.task
     recorded: dict[str, Any] = {"world": task.world.name, "start": task.start, "goal": task.goal}
-    recorded |= {"planner": planner.name, "robot": record.robot.name, "seed": record.seed}
+    recorded |= {"planner": record.planner.name, "robot": record.robot.name, "seed": record.seed}
     given: dict[str, Any] = {"planner": record_name(words.planner), "seed": words.seed}
     given |= {key: tuple(getattr(words, key)) for key in ("start", "goal") if getattr(words, key) is not None}
     if not isinstance(words.world, str):
@@ -78,16 +86,16 @@ def _contradicted(record: DriveRecord, words: Written) -> Iterator[str]:
     if words.robot in list_robots():
         given["robot"] = words.robot
     yield from (key for key, value in given.items() if value != recorded[key])
-    options = words.options
+
+
+def _contradicted_settings(record: DriveRecord, words: Written) -> Iterator[str]:
+    """Yield the key of every contradicted option and setting; those that act on movers alone may differ without any."""
+    options, settings = words.options, words.settings
     if words.planner in PLANNERS:
         options = settings_of(load_planner(words.planner, **options))
-    yield from (f"planner.{key}" for key, value in planner.settings.items() if options.get(key, value) != value)
-    if record.controller.name == "PurePursuit":
-        yield from _contradicted_settings(record, words.settings)
-
-
-def _contradicted_settings(record: DriveRecord, settings: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the key of every contradicted setting; those that act on movers alone may differ without any."""
+    yield from (f"planner.{key}" for key, value in record.planner.settings.items() if options.get(key, value) != value)
+    if record.controller.name != "PurePursuit":
+        return
     chosen = settings.get("margin") == "auto" and record.margin_choice is not None
     fields = scenario_fields({key: value for key, value in settings.items() if key != "margin" or not chosen})
     given, in_force = written(fields.__getitem__), _settings_in_force(record)
