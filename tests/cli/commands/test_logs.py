@@ -63,5 +63,5 @@ def test_the_planning_of_ones_own_planner_is_filmed_with_its_class(antdrive, ref
     assert antdrive("run", small, "-p", "own.py:Own", *set_up, "--no-figures", "-o", "r")[0] == 0
     words = ("render", "r", "-o", "f.mp4", "--size", "160x160", "--fps", "2", "--prelude", "1")
     LOADED.clear()  # as in another process
-    assert "no planner is called 'Own'" in refused(*words)
+    assert "'Own' is not registered" in refused(*words)
     assert antdrive(*words, "--planner", "own.py:Own")[0] == 0

@@ -72,7 +72,7 @@ def test_a_planner_from_a_file_goes_with_the_suite(antdrive, tmp_path):
     assert (code, err) == (0, "")
     assert json.loads(out)["repeats"]
     (case,) = load_suite(tmp_path / "deep" / "small" / "empty-small.drive.yaml")
-    assert case.entry.planner == {"file": "../../own.py", "name": "Mine"}
+    assert case.entry.planner == "../../own.py:Mine"
 
 
 @pytest.mark.slow
