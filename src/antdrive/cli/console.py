@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
-from antdrive.base.errors import visible
+from antdrive.base.errors import amount, visible
 from antdrive.base.tables import BAD, GOOD
 from antdrive.cli.commands import DEBUG
 
@@ -93,7 +93,7 @@ def stage(label: str) -> Iterator[None]:
 def working(label: str) -> Iterator[Callable[[str, int], None]]:
     """Show a bar for work of unknown length. Yields a function that takes the current stage and the number of runs."""
     with _progress(label, "{task.fields[note]}", "TimeElapsedColumn") as show:
-        yield lambda stage, done: show(note=f"{stage}, {done} runs") if show else None
+        yield lambda stage, done: show(note=f"{stage}, {amount(done, 'run')}") if show else None
 
 
 @contextmanager

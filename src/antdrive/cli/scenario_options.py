@@ -110,23 +110,22 @@ class Setup:
         words = dataclasses.replace(
             place, planner=self.planner, options=chosen["planner"], robot=self.robot, settings=settings, seed=seed
         )
-        return words.scenario(at=functools.partial(at_option, words), choose=with_chosen_margin)
+        return words.scenario(at=functools.partial(at_option, words), choose=with_calibrated_margin)
 
 
-def with_chosen_margin(scenario: "Scenario") -> "Scenario":
+def with_calibrated_margin(scenario: "Scenario") -> "Scenario":
     """Return the scenario with a calibrated margin. Each robot and setting is calibrated once.
 
     Progress is shown as a bar on a terminal, otherwise as one line.
     """
-    from antdrive.runs.margins.choice import DRIVES, known_margin
-    from antdrive.runs.margins.choice import with_chosen_margin as choose
+    from antdrive.runs.margins.choice import DRIVES, known_margin, with_chosen_margin
 
     conditions = scenario.loss_factors
     if known_margin(conditions) is not None:
-        return choose(scenario)
+        return with_chosen_margin(scenario)
     require_physics()  # before a line says that it drives
     label = f"calibrating {conditions.robot.name}, noise {conditions.noise:g}, smoothing {conditions.smoothing}"
     if not sys.stderr.isatty():
         print_error(f"{label}: about {TYPICAL_MARGINS * DRIVES} short drives, result cached")
     with bar(label) as progress:
-        return choose(scenario, lambda done, margin: progress(min(0.99, done / (TYPICAL_MARGINS * DRIVES))))
+        return with_chosen_margin(scenario, lambda done, margin: progress(min(0.99, done / (TYPICAL_MARGINS * DRIVES))))

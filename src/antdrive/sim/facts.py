@@ -14,11 +14,16 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import METRICS, measure, succeeded
-from antdrive.sim.log.record import DriveRecord, SensingRecord, plain_value, settings_of
+from antdrive.sim.log.record import DriveRecord, plain_value, settings_of
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
+
+
+#: Map, localisation and odometry of a log whose record leaves them out, as at their defaults.
+SENSED: Mapping[str, Any] = {name: SETTINGS[name].default for name in ("map", "localisation", "odometry")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +84,9 @@ def _ends(log: LoggedRun) -> dict[str, Any]:
 
 def _changes(log: LoggedRun) -> dict[str, Any]:
     """Return the keys of `settings` that the log repeats, without the rules among movers that were asked for."""
-    sensed = log.record.sensing or SensingRecord(map="given", localisation="fixes", odometry=1.0)
     return {
         "controller": log.record.controller.settings,
-        **settings_of(sensed),
+        **(SENSED if log.record.sensing is None else settings_of(log.record.sensing)),
         "unseen": [[disc.x, disc.y, disc.radius] for disc in log.record.unseen],
     }
 

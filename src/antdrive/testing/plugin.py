@@ -194,10 +194,10 @@ def update_of(config: pytest.Config) -> Update:
 
 def results_of(config: pytest.Config) -> Results:
     """Return where this pytest run writes logs, figures and films."""
-    from antdrive.views.artefacts import Results, default_folder
+    from antdrive.views.artefacts import Results, cached_results
 
     given = config.getoption("drive_results")
-    folder = config.invocation_params.dir / given if given else default_folder(config.rootpath)
+    folder = config.invocation_params.dir / given if given else cached_results(config.rootpath)
     return Results(folder, config.getoption("drive_film"), Path(counting_folder(config)), config.rootpath)
 
 

@@ -87,7 +87,7 @@ def portable_name(name: str) -> str:
     return f"{short}-{zlib.crc32(name.encode()):08x}"
 
 
-def default_folder(root: Path) -> Path:
+def cached_results(root: Path) -> Path:
     """Return the folder of a project's results in the user's cache, or a temporary folder if the cache is read-only."""
     name = f"{portable_name(root.name or 'root')}-{zlib.crc32(str(root).encode()):08x}"
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")

@@ -10,7 +10,7 @@ from antdrive.cli import options
 from antdrive.cli.console import bar, print_error, print_line, show
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED
 from antdrive.cli.options import argument, flag, option
-from antdrive.cli.scenario_options import with_chosen_margin
+from antdrive.cli.scenario_options import with_calibrated_margin
 
 if TYPE_CHECKING:
     from antdrive.testing.evaluation import CheckResult, Update
@@ -76,7 +76,7 @@ def _drive(
 ) -> "tuple[list[CheckResult], list[str]]":
     """Drive and evaluate all named tests, and print each result; return the results and the unused baselines."""
     from antdrive.testing.checking import check_tests
-    from antdrive.views.artefacts import Films, Results, default_folder
+    from antdrive.views.artefacts import Films, Results, cached_results
     from antdrive.views.run_folder import check_folder
 
     if film not in get_args(Films):
@@ -91,10 +91,10 @@ def _drive(
         for line in rest:
             print_line(f"  {line}")
 
-    results = Results(folder or default_folder(Path.cwd()), cast("Films", film))
+    results = Results(folder or cached_results(Path.cwd()), cast("Films", film))
     with bar("driving") as progress:
         return check_tests(
-            words, only=only, jobs=jobs, update=update, results=results, choose=with_chosen_margin,
+            words, only=only, jobs=jobs, update=update, results=results, choose=with_calibrated_margin,
             report=(lambda _: None) if json else report, progress=progress,
         )  # fmt: skip
 

@@ -9,7 +9,7 @@ from antdrive.cli import options
 from antdrive.cli.console import show, this_command, working
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import film_drives, results_folder
-from antdrive.cli.scenario_options import with_chosen_margin
+from antdrive.cli.scenario_options import with_calibrated_margin
 from antdrive.runs.results_folder import mark_of
 from antdrive.views.run_folder import write_result, write_run
 
@@ -49,7 +49,7 @@ def shrink(
 
     if planner is not None and "::" in failure:
         raise InputError(f"--planner: applies to logs only; the suite names the planner of {failure}")
-    scenario, case = failing(failure, planner, with_chosen_margin)
+    scenario, case = failing(failure, planner, with_calibrated_margin)
     crossed = parse_bound(bound) if bound is not None else broken_bound(case, scenario)
     name = f"{scenario_name(scenario.task.world.name)}-small"
     mark = mark_of(scenario.key, str(crossed))

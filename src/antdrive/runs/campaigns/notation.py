@@ -1,4 +1,4 @@
-"""Campaigns in words, as on a command line: forest:20, as:ants=10..50..20, seeds 0-9, tasks 30:5."""
+"""Campaigns in words, as on a command line: forest:20, as.ants=10..50..20, seeds 0-9, tasks 30:5."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def campaign_from(path: Path | None, settings: Mapping[str, Any], **words: Any) 
     Args:
         path: the campaign file; None: the words name worlds and planners
         settings: settings by key, as in files
-        words: `worlds`, `generate`, `planners`, `robots`, `seeds`, `tasks` and `run_limit`
+        words: `worlds`, `generate`, `planners`, `options` (theirs), `robots`, `seeds`, `tasks` and `run_limit`
 
     Raises:
         InputError: a word or the file is invalid; the message names the option.

@@ -13,7 +13,7 @@ from typing import Any
 
 from antdrive.base.errors import InputError, input_error
 from antdrive.runs.statistics.run_table import RunTable
-from antdrive.sim.facts import FACTS, LoggedRun, facts_of
+from antdrive.sim.facts import FACTS, SENSED, LoggedRun, facts_of
 from antdrive.sim.log.margin import has_default
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
@@ -30,11 +30,10 @@ UNDRIVEN = (Outcome.NO_PATH.key, Outcome.STOPPED.key)  # outcomes of runs withou
 RED = (Outcome.COLLIDED.key, Outcome.INVALID_PLAN.key)  # outcomes with a red badge
 REQUIRED = ("world", "planner", "robot", "seed", "outcome")  # keys of result.json
 WRITTEN = tuple(name for name, fact in FACTS.items() if fact.proof == "written")
-#: Columns of settings, as in a campaign's table, by their keys in result.json; and the defaults of those in `settings`.
+#: Columns of settings, as in a campaign's table, by their keys in result.json.
 COLUMNS = {"margin_m": "margin", "cell_m": "cell"} | {
     name: name for name in ("smoothing", "noise", "physics_hz", "control_hz")
 }
-SENSED = {"map": "given", "localisation": "fixes", "odometry": 1.0}
 
 
 @dataclass(frozen=True)
