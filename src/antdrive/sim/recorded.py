@@ -102,7 +102,7 @@ def _contradicted_settings(record: DriveRecord, words: Written) -> Iterator[str]
     unknown = {"seed"} | {key for key in ("margin", "cell", "time_limit", "sees") if key not in given}  # resolved
     if record.perception is None or record.perception.kind == "motions":
         unknown |= {"sees", "avoid"}
-    if record.perception is None and (record.sensing is None or record.sensing.map == "given"):
+    if record.perception is None and not record.mapless:
         unknown.add("replan")
     keys = (one.key for one in SETTINGS.values())
     yield from (key for key in keys if key not in unknown and given.get(key) != in_force.get(key))

@@ -66,7 +66,7 @@ def rollout_of(
 def configuration_of(s: Scenario, grid: Grid, answer: PlanResult) -> dict[str, Any]:
     """Return the fields of a scenario's record that a drive does not change, except its time limit and smoothing."""
     perception, avoidance = (perception_of(s), avoidance_of(s)) if s.moving else (None, None)
-    replanning = s.replanning if s.moving or s.map == "none" else None
+    replanning = s.replanning if s.moving or s.mapless else None
     return {
         "task": s.task,
         "unseen": s.unseen,

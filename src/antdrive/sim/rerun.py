@@ -48,7 +48,7 @@ class Mismatch:
 def fingerprint(s: Scenario) -> str:
     """Return a hash of a scenario's plan, and of its drive if the robot replans; of the message if the planner raises."""
     try:
-        if s.moving or s.map == "none":
+        if s.moving or s.mapless:
             _, answer, rollout = driven(s)
             return fingerprint_of(s, answer, rollout)
         return fingerprint_of(s, plan(s)[1], None)
@@ -68,7 +68,7 @@ def fingerprint_of(s: Scenario, answer: PlanResult, rollout: Rollout | None) -> 
     sha = hashlib.sha256(answer.status.name.encode())
     for array in (answer.line, *times):
         sha.update(array.tobytes())
-    if rollout is not None and (s.moving or s.map == "none"):
+    if rollout is not None and (s.moving or s.mapless):
         sha.update(rollout.drive_digest.encode())
     return sha.hexdigest()
 

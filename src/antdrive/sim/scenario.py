@@ -124,25 +124,25 @@ class Scenario(Settings):
 
     def _check_sensing(self) -> None:
         """Raise FieldError for invalid combinations of map, localisation, perception, planner and robot."""
-        if self.map == "none" and self.replanning is None:
+        if self.mapless and self.replanning is None:
             raise FieldError(
                 "replan", "none: a mapless robot finds its way by replanning; false replans around no movers"
             )
-        if self.map == "none" and self.robot.lidar is None:
+        if self.mapless and self.robot.lidar is None:
             raise FieldError("map", f"none: {self.robot.name} {NO_LIDAR}")
         kind = self.known_perception.kind
         if kind == "lidar" and self.robot.lidar is None:
             raise FieldError("sees", f"lidar: {self.robot.name} {NO_LIDAR}")
-        if kind == "lidar" and self.map == "given" and self.localisation == "odometry":
+        if kind == "lidar" and not self.mapless and self.localisation == "odometry":
             raise FieldError("sees", "lidar: with a given map the pose must not drift; localise by fixes or true")
-        drifts = self.map == "none" and self.drifting
+        drifts = self.mapless and self.drifting
         if drifts and self.task.world.movers and kind != "lidar":
             raise FieldError(
                 "sees",
                 f"{kind}: the pose drifts with localisation {self.localisation}, which displaces ground-truth movers in "
                 "the robot's frame; write lidar, or localise by fixes or true",
             )
-        if self.map == "given" and self.localisation == "matching":
+        if not self.mapless and self.localisation == "matching":
             raise FieldError("localisation", "matching: needs map none, since scans are matched to the occupancy map")
         can = capabilities_of(self.planner)
         if self.footprint == "exact" and not self.plans_footprints and not self.robot.footprint.is_disc:
@@ -152,7 +152,7 @@ class Scenario(Settings):
                 f"exact: {self.planner_label} plans for the disc around the robot{among}; `antdrive planners` lists those that "
                 "plan for its footprint",
             )
-        if self.map == "none" and can.needs_motions:
+        if self.mapless and can.needs_motions:
             raise FieldError(
                 "map", f"none: {self.planner_label} needs ground-truth motions of movers, which a mapless robot lacks"
             )
@@ -323,7 +323,7 @@ class Scenario(Settings):
         """Side of the planning cells [m]; fine without a map, since coarse cells close gaps."""
         if self.cell is not None:
             return self.cell
-        return min(self.task.cell, FINE) if self.map == "none" else self.task.cell
+        return min(self.task.cell, FINE) if self.mapless else self.task.cell
 
     @property
     def sensing(self) -> SensingRecord | None:
@@ -348,7 +348,7 @@ class Scenario(Settings):
     @property
     def cell_by_cell(self) -> bool:
         """Whether the planner decides cell by cell, among movers on a map."""
-        around = self.map == "given" and self.moving and self.replanning is not None and self.replanning.around_movers
+        around = not self.mapless and self.moving and self.replanning is not None and self.replanning.around_movers
         return around and capabilities_of(self.planner).cell_by_cell
 
     @property
@@ -377,9 +377,14 @@ class Scenario(Settings):
         return bool(self.driven_world.movers) or self.known_perception.kind == "lidar"
 
     @property
+    def mapless(self) -> bool:
+        """Whether the robot has no map."""
+        return self.map == "none"
+
+    @property
     def scans(self) -> bool:
         """Whether the drive uses the robot's lidar."""
-        return self.map == "none" or (self.known_perception.kind == "lidar" and not self.timed)
+        return self.mapless or (self.known_perception.kind == "lidar" and not self.timed)
 
     @property
     def noisy(self) -> bool:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from annotated_types import Ge, Gt, Le
 
 from antdrive.base.errors import FieldError
-from antdrive.sim import effects
+from antdrive.sim import idle_settings
 from antdrive.sim.policy import Perception, ReplanPolicy
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Setting:
     usual: str = ""  # meaning of the default None, for `--help`
     # version of the campaign-key format that added the setting; settings added after version 1 are omitted at their default
     since: int = 1
-    idle: effects.Idle = effects.never  # why it cannot act in a scenario
+    idle: idle_settings.Idle = idle_settings.never  # why it cannot act in a scenario
 
 
 def _pursuit() -> "PurePursuit":
@@ -81,7 +81,7 @@ class Settings:
             "KIND",
             choices=SMOOTHINGS,
             axis=True,
-            idle=effects.if_timed,
+            idle=idle_settings.if_timed,
         ),
     ] = "clearance"
     noise: Annotated[
@@ -92,7 +92,7 @@ class Settings:
             "Robot",
             "FACTOR",
             axis=True,
-            idle=effects.without_noise,
+            idle=idle_settings.without_noise,
         ),
     ] = 0.0
     margin: Annotated[
@@ -129,7 +129,7 @@ class Settings:
             "auto|disc|exact",
             choices=FOOTPRINTS,
             since=2,
-            idle=effects.with_one_shape,
+            idle=idle_settings.with_one_shape,
         ),
     ] = "auto"
     map: Annotated[
@@ -151,14 +151,18 @@ class Settings:
             "KIND",
             choices=LOCALISATIONS,
             since=2,
-            idle=effects.with_exact_fixes,
+            idle=idle_settings.with_exact_fixes,
         ),
     ] = "fixes"
     odometry: Annotated[
         float,
         Ge(0),
         Setting(
-            "factor on the documented errors of odometry", "Sensing", "FACTOR", since=2, idle=effects.without_odometry
+            "factor on the documented errors of odometry",
+            "Sensing",
+            "FACTOR",
+            since=2,
+            idle=idle_settings.without_odometry,
         ),
     ] = 1.0
     controller: Annotated[
@@ -168,7 +172,7 @@ class Settings:
             "Robot",
             flag="",
             form="controller",
-            idle=effects.on_other_routes,
+            idle=idle_settings.on_other_routes,
         ),
     ] = field(default_factory=_pursuit)
     perception: Annotated[
@@ -181,7 +185,7 @@ class Settings:
             key="sees",
             form="perception",
             usual="velocities; lidar without a map",
-            idle=effects.without_choice_of_perception,
+            idle=idle_settings.without_choice_of_perception,
         ),
     ] = None
     avoidance: Annotated[
@@ -191,7 +195,7 @@ class Settings:
             "Movers",
             key="avoid",
             form="avoidance",
-            idle=effects.without_movers,
+            idle=idle_settings.without_movers,
         ),
     ] = field(default_factory=_avoidance)
     replanning: Annotated[
@@ -202,7 +206,7 @@ class Settings:
             "Movers",
             key="replan",
             form="replanning",
-            idle=effects.without_replans,
+            idle=idle_settings.without_replans,
         ),
     ] = field(default_factory=ReplanPolicy)
     unseen: Annotated[
@@ -239,7 +243,7 @@ class Settings:
         int,
         Ge(0),
         Le(2**63 - 1),
-        Setting("seed of all random numbers", "World", "NUMBER", axis=True, idle=effects.without_chance),
+        Setting("seed of all random numbers", "World", "NUMBER", axis=True, idle=idle_settings.without_chance),
     ] = 0
 
     def __post_init__(self) -> None:

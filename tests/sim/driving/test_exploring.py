@@ -26,7 +26,7 @@ from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverTracking, SimulatedLidar, Survey, reset_ticks
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.physics.engine import State
-from antdrive.sim.policy import SCANNED, STALLED, Perception
+from antdrive.sim.policy import Perception, Trigger
 from antdrive.sim.recorded import rebuilt
 from antdrive.sim.sensing import Scanner
 from antdrive.views.map_reconstruction import MapReconstruction
@@ -307,7 +307,7 @@ def test_the_map_is_reset_after_failed_plans(log):
     timed = tuple(replace(replan, t=(k + 1) / 60) for k, replan in enumerate(replans))
     assert list(reset_ticks(replace(log.record, replans=timed))) == [7]
     assert list(reset_ticks(replace(log.record, replans=timed[:6]))) == []
-    turned = replace(timed[6], trigger=SCANNED)  # its plan uses the whole map
+    turned = replace(timed[6], trigger=Trigger.SCAN_TURN)  # its plan uses the whole map
     assert list(reset_ticks(replace(log.record, replans=(*timed[:6], turned, timed[7])))) == [8]
 
 
@@ -523,7 +523,7 @@ def test_a_robot_with_a_narrow_lidar_makes_a_scan_turn_first(spec):
     task = Task(World("hall", OPEN, (Disc(2.6, 4.2, 0.3),)), HERE, (1.2, 4.6), goal_tolerance=0.25, cell=0.1)
     done = searching(changed(spec, "lidar", field_of_view=1.0, rate=10.0), task)
     assert done.succeeded, (done.outcome, done.reason, triggers(done))
-    assert triggers(done)[0] == SCANNED
+    assert triggers(done)[0] == Trigger.SCAN_TURN
     first = done.rollout.pose[done.rollout.t < done.rollout.record.replans[0].t - 0.1]
     assert np.ptp(np.unwrap(first[:, 2])) > 2 * math.pi - 1.0  # with what it sees at once this is all around
     assert np.hypot(*(first[:, :2] - HERE[:2]).T).max() < 0.02
@@ -537,7 +537,7 @@ def test_a_robot_that_cannot_turn_where_it_stands_makes_room_ahead(jackal):
     assert done.succeeded, (done.outcome, done.reason, triggers(done))
     assert done.rollout.pose[:, 0].max() > 4.2
     assert "stalled" in triggers(done)
-    assert SCANNED in triggers(done)  # after it has made room: it had not seen what is behind it
+    assert Trigger.SCAN_TURN in triggers(done)  # after it has made room: it had not seen what is behind it
 
 
 def test_a_mover_in_the_circle_of_the_first_turn_is_given(jackal):
@@ -556,7 +556,7 @@ def test_a_boxed_in_robot_makes_a_scan_turn_before_it_gives_up(jackal):
     assert not len(done.rollout.contacts)
     assert done.outcome is Outcome.TIMED_OUT
     assert done.reason.startswith("no way through what was seen")
-    assert SCANNED in triggers(done)
+    assert Trigger.SCAN_TURN in triggers(done)
     assert replay(done.rollout).problems == ()
 
 
@@ -624,7 +624,7 @@ def survey_of(robot, left, right, open_=1.0):
     turns = {1.0: left, -1.0: right}
     return SimpleNamespace(
         lidar=robot.lidar,
-        map=SimpleNamespace(share=1, turns=1),
+        map=SimpleNamespace(share=1, stride=1),
         clear_turn=lambda pose, side, farthest: min(turns[side], farthest),
         clear_distance=lambda pose, speed, rate, longest: 0.0,
         clear_way=lambda pose, twist, farthest, freespace: open_ if freespace else 0.0,
@@ -704,7 +704,7 @@ def test_a_robot_stands_briefly_between_gaps_hardly_wider_than_itself(gap):
     log = done.rollout
     still = (np.abs(log.command) < 0.02).all(axis=1)
     rows = np.flatnonzero(np.diff(np.concatenate(([0], still, [0]))))
-    stalls = [r.t for r in log.record.replans if r.trigger == STALLED]
+    stalls = [r.t for r in log.record.replans if r.trigger == Trigger.STALLED]
     longest = (rows[1::2] - rows[::2]).max() / log.record.physics_hz
     assert stalls
     assert longest < IDLE_TIME + INTERVAL + 0.05

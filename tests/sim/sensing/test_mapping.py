@@ -356,7 +356,7 @@ def test_every_beam_has_its_turn(jackal):
     """After two whole scans the ground is seen as after one of all beams."""
     scanner = Scanner(jackal.lidar, POSTS)
     grid, every = OccupancyMap(jackal.lidar), OccupancyMap(jackal.lidar)
-    every.turns = 1
+    every.stride = 1
     for number in range(13):
         pose = (0.5, 0.2, 0.3) if number else (0.0, 0.0, 0.0)
         for found in (grid, every):

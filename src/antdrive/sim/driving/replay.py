@@ -99,7 +99,7 @@ def replay(rollout: Rollout) -> ReplayCheck:
 def _other_senses(rollout: Rollout) -> Iterator[str]:
     """Yield where estimates, motor targets or scans differ from the seed's noise and the lidar's measurements."""
     record = rollout.record
-    if record.exploring and not len(rollout.scans):
+    if record.mapless and not len(rollout.scans):
         yield "replay: a log without a map must have scans"
         return
     localiser = logged_localiser(record)
@@ -188,7 +188,7 @@ def scans_of(rollout: Rollout) -> tuple[Scans | None, Mapping[int, Callable[[Pos
     assert lidar is not None
     hz, noisy = record.control_hz, record.noise > 0
     sensor = SimulatedLidar.of(lidar, record.world, rollout.trajectories(), seed=record.seed, noisy=noisy, hz=hz)
-    if not record.exploring:
+    if not record.mapless:
         return Scans(sensor), {}
     tracks_movers = record.perception is not None and record.perception.kind == "lidar"
     tracking, matching = MoverTracking(lidar, hz) if tracks_movers else None, logged_localiser(record).matched

@@ -19,7 +19,7 @@ from antdrive.sim.driving.parts import Rows
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import scans_logged
 from antdrive.sim.log.streams import random_stream
-from antdrive.sim.policy import SCANNED
+from antdrive.sim.policy import Trigger
 from antdrive.sim.sensing.mapping import OccupancyMap, clear_way, shape_of
 from antdrive.sim.sensing.matching import FAR, ScanMatcher, without_sliding
 from antdrive.sim.sensing.scanner import Scanner
@@ -56,7 +56,7 @@ def reset_ticks(record: DriveRecord) -> Iterator[int]:
     """Yield the control periods in which a mapless robot reset its map, after `PATIENCE` failed plans in a row."""
     failures = 0
     for replan in record.replans:
-        if failures >= PATIENCE and replan.trigger != SCANNED:
+        if failures >= PATIENCE and replan.trigger != Trigger.SCAN_TURN:
             failures = 0
             yield round(replan.t * record.control_hz)
         failures = 0 if replan.solved else failures + 1

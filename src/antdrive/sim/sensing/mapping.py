@@ -45,7 +45,7 @@ class OccupancyMap:
     need nine such scans.
 
     Every `share`-th scan is entered as a whole. The others contribute their hits only: obstacles appear at once, and free
-    ground with the next whole scan. A whole scan enters the free paths of every `turns`-th beam, of other beams each
+    ground with the next whole scan. A whole scan enters the free paths of every `stride`-th beam, of other beams each
     time; the first scan enters those of all beams.
 
     Attributes:
@@ -54,7 +54,7 @@ class OccupancyMap:
         trust: ground is observed as free up to this distance [m]
         scans: number of scans entered
         share: every `share`-th scan is entered as a whole, beginning with the first
-        turns: whole scans enter the free paths of every `turns`-th beam
+        stride: whole scans enter the free paths of every `stride`-th beam
         beams: directions of the lidar's beams in its frame (beams, 2)
         layouts: number of layouts; cell indices change when the map grows
         arrays: arrays of the map by name
@@ -84,7 +84,7 @@ class OccupancyMap:
     ) -> None:
         self._moving = moving
         self.share = max(1, round(lidar.rate / OFTEN)) if share is None else share
-        self.turns = max(1, math.floor(lidar.rate / self.share / EACH_WAY))
+        self.stride = max(1, math.floor(lidar.rate / self.share / EACH_WAY))
         require("cell", cell, above=0)
         require("horizon", horizon, above=0)
         self.cell, self.horizon = cell, min(horizon, lidar.max_range)
@@ -140,12 +140,12 @@ class OccupancyMap:
         if self._spare < len(ranges):
             self._lengthen_lists()
         number, rest = divmod(self.scans, self.share)
-        turn = -1 if rest else number % self.turns
-        turns = self.turns if self.scans else 1
+        first = -1 if rest else number % self.stride
+        stride = self.stride if self.scans else 1
         self.scans += 1
         mask = self._none if omitted is None else np.ascontiguousarray(omitted)
         count = kernels.insert(
-            x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self._begin, turn, turns, mask,
+            x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self._begin, first, stride, mask,
             self.horizon, self.trust, self.scans, self.plain, self._changed,
         )  # fmt: skip
         if self._moving and not rest:
