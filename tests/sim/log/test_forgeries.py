@@ -6,12 +6,21 @@ import numpy as np
 import pytest
 
 from antdrive.sim import Rollout, certify
-from antdrive.sim.driving.replay import replay
 from antdrive.sim.log.record import PROOFS, MarginRecord, differences
 from antdrive.sim.log.rollout import FORMS
 from tests.audit.forged_fields import ENTRIES, POOL
 from tests.audit.forged_logs import KINDS, LEVELS, UNHASHED, Log, digest
-from tests.audit.forgeries import Finding, accepted, all_findings, drawn, forged, found, genuine_drives, more_drives
+from tests.audit.forgeries import (
+    JUDGE,
+    Finding,
+    accepted,
+    all_findings,
+    drawn,
+    forged,
+    found,
+    genuine_drives,
+    more_drives,
+)
 from tests.audit.kinds import CROSSED, STILL
 from tests.records import COARSE, changed
 
@@ -47,15 +56,6 @@ SENTENCES = {
     "a contact with another obstacle": ("turtlebot, collided", "a contact with obstacle 0"),
     "a contact of impossible depth and force": ("turtlebot, collided", "no farther apart than"),
 }
-#: What only the noise that is drawn again shows.
-NOISE = {
-    "an estimate without error": ("turtlebot, noise", "estimate differs from the noise"),
-    "a higher noise level": ("jackal, noise", "estimate differs from the noise"),
-    "another seed of a noisy drive": ("jackal, movers, noise", "estimate differs from the noise"),
-    "targets without slip": ("turtlebot, noise", "actuated differs from the noise"),
-}
-
-
 #: Kinds of drives that have the arrays and keys that the eight by hand lack.
 KINDS_OF_DRIVES = (
     ("disc", "none", "lidar", 1.0, "astar"),
@@ -107,8 +107,7 @@ def test_genuine_drives_pass_every_check_and_have_the_digest_that_a_forger_compu
     for name, log in drives.items():
         assert certify(log).certified != ("collided" in name)
         assert list(differences(log.record, task=log.record.task, robot=log.record.robot)) == []
-        again = replay(log)
-        assert (again.exact, again.problems) == (True, ()), name
+        assert JUDGE.replayed(log) == "", name
         copy = Log.of(log)
         assert digest(copy.arrays, log.record.to_json(without=UNHASHED)) == log.digest
 
@@ -144,26 +143,3 @@ def test_each_kind_fails_the_check_meant_for_it(kind, drives, tmp_path):
     assert LEVELS.index(level) <= LEVELS.index(KINDS[kind].level), why
     said = [why] if level == "load" else certify(Rollout.load(path)).problems
     assert any(words in sentence for sentence in said), said
-
-
-@pytest.mark.parametrize("kind", NOISE)
-def test_noise_that_the_seed_does_not_give_is_found_by_the_replay(kind, drives, tmp_path):
-    name, words = NOISE[kind]
-    path = tmp_path / "forged.npz"
-    assert forged(KINDS[kind], drives[name], path)
-    assert any(words in sentence for sentence in replay(Rollout.load(path)).problems)
-
-
-def test_a_noisy_collision_has_the_noise_of_its_seed(drives):
-    """Control and noise end with the contact."""
-    from antdrive.sim import Scenario, run
-    from antdrive.worlds import Disc
-
-    log = drives["jackal, noise"]
-    x, y = log.pose[len(log.t) // 2, :2].tolist()
-    scenario = Scenario.of(log.record.task, "astar", log.record.robot, noise=1.0, seed=5, unseen=(Disc(x, y, 0.1),))  # fmt: skip
-    collided = run(scenario).rollout
-    assert len(collided.contacts)
-    assert replay(collided).problems == ()
-    late = changed(collided, "record", seed=6)
-    assert any("noise of seed 6" in problem for problem in replay(late).problems)

@@ -57,7 +57,7 @@ class Moment(NamedTuple):
 
 
 class Plant(Protocol):
-    """Robot that executes twists: in physics (`Bullet`), exactly (`Kinematic`), or from a log (`Logged`)."""
+    """Robot that executes twists: in physics (`Bullet`) or exactly (`Kinematic`)."""
 
     state: State  # true pose and velocity
 
@@ -203,7 +203,7 @@ class Rule(Protocol):
 
 
 class Decider(Protocol):
-    """Source of commands: a `Driver`, a rehearsal or a log."""
+    """Source of commands: a `Driver` or a rehearsal."""
 
     step: Step  # the current step
 

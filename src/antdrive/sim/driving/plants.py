@@ -74,14 +74,6 @@ class Bullet:
         self._engine.command(*actuated)
         self._log(self.per_tick, (*step.command, step.pursuit.limiter, *actuated))
 
-    def play(self, targets: Floats) -> Drive:
-        """Play motor targets (N, 2), one row per physics step, and return the log."""
-        for row in range(0, len(targets), self.per_tick):
-            target = targets[row].tolist()
-            self._engine.command(*target)
-            self._log(min(self.per_tick, len(targets) - row), (*target, 0, *target))
-        return self._drive(Ending(Outcome.TIMED_OUT))
-
     def _log(self, steps: int, in_force: tuple[float, ...]) -> None:
         self.state, contacts = self._engine.advance(steps, self._motion)
         if contacts:
@@ -95,9 +87,6 @@ class Bullet:
         if self.touched:
             self._engine.command(0.0, 0.0)
             self._log(rows_after_contact(self._engine.physics_hz), (0.0, 0.0, self._in_force[-1][2], 0.0, 0.0))
-        return self._drive(ending)
-
-    def _drive(self, ending: Ending) -> Drive:
         engine = self._engine
         states = np.concatenate([[self._start], engine.states(self._motion)])
         in_force = np.repeat(np.array(self._in_force, dtype=np.float64), self._lengths, axis=0)
