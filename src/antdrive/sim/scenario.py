@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import inspect
 import json
 import os
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -457,15 +456,3 @@ def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> s
 def key_of(identity: str, seed: int) -> str:
     """Return the hash of a scenario's identity and seed: a SHA-256, cut to 32 hexadecimal digits."""
     return hashlib.sha256(f"{identity}\n{seed}".encode()).hexdigest()[:KEY_DIGITS]
-
-
-def _short(signature: inspect.Signature) -> inspect.Signature:
-    """Return a signature without the annotations' metadata, to keep `help()` readable."""
-    parameters = [
-        one.replace(annotation=get_args(one.annotation)[0]) if get_origin(one.annotation) is Annotated else one
-        for one in signature.parameters.values()
-    ]
-    return signature.replace(parameters=parameters)
-
-
-Scenario.__signature__ = _short(inspect.signature(Scenario))  # type: ignore[attr-defined]

@@ -128,11 +128,6 @@ def test_scans_keep_the_estimate_near_the_truth(log):
     assert 0 < off.max() < 0.06
 
 
-def test_the_drive_can_be_rebuilt(drive, log):
-    assert rebuilt(log.record).sensing == drive.scenario.sensing
-    assert run(rebuilt(log.record)).rollout.digest == log.digest
-
-
 def turning_room(robot, side):
     """A robot at rest on a route with a turn by 90 degrees; a post almost closes the turn."""
     corner = math.radians(45) + math.atan2(robot.footprint.half_width, robot.footprint.half_length)

@@ -223,18 +223,9 @@ class MoverTracker:
     def _rules_where(self, complete: bool) -> kernels.TrackingRules:
         policy, lidar = self.policy, self._lidar
         measured = lidar.sigma**2 + lidar.resolution**2 / 12
+        own = {key: value for key, value in vars(policy).items() if key in kernels.TrackingRules._fields}
         return kernels.TrackingRules(
-            gap=float(policy.gap),
-            least=int(policy.least),
-            settle=float(policy.settle),
-            smallest=float(policy.smallest),
-            largest=float(policy.largest),
-            gate=float(policy.gate),
-            speed=float(policy.speed),
-            confirmed=int(policy.confirmed),
-            way=float(policy.way),
-            patience=float(policy.patience),
-            doubt=float(policy.doubt),
+            **{key: type(getattr(TrackingPolicy, key))(value) for key, value in own.items()},  # kernels tell 2 from 2.0
             whole=policy.error**2 + measured,
             part=(PARTIAL * policy.error) ** 2 + measured,
             pose_xy=float(self._pose_xy) ** 2,
