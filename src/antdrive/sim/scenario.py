@@ -6,13 +6,12 @@ import dataclasses
 import hashlib
 import json
 import os
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from antdrive.base import Floats
 from antdrive.base.checks import suggest
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_position
@@ -446,11 +445,11 @@ def usual_time_limit(length: float, robot: RobotSpec, noise: float) -> float:
     return 30.0 + 10.0 * length / steady(robot, heading_error(robot, noise)).max_speed
 
 
-def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:
-    """Draw the driven world as SVG, with start, goal, paths of movers, and lines: points, colour, whether dashed."""
+def picture_of(s: Scenario) -> str:
+    """Draw the driven world as SVG, with start, goal and paths of movers."""
     world, task = s.driven_world, s.task
     goal, movers = (*task.goal, task.goal_tolerance), world.mover_paths(task.start[:2], s.seed)
-    return world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
+    return world_svg(world.bounds, world.discs, start=task.start, goal=goal, movers=movers)
 
 
 def key_of(identity: str, seed: int) -> str:

@@ -451,14 +451,6 @@ def test_a_mapless_task_has_no_obstacle_and_no_wall():
     assert mapless_task(TASK).world.obstacles == ()
 
 
-def test_a_drive_with_a_map_is_recorded_as_before(jackal):
-    usual = scenario(jackal, map="given", localisation="fixes")
-    assert usual.sensing is None
-    assert "map" not in usual.as_dict()["settings"]
-    assert scenario(jackal).as_dict()["settings"]["map"] == "none"
-    assert math.isfinite(usual.odometry)
-
-
 OPEN = (0.0, 0.0, 8.0, 8.0)
 HERE = (4.0, 4.0, 0.0)
 FORWARD = Twist(0.5, 0.0)
