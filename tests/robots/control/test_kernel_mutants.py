@@ -7,7 +7,7 @@ import pytest
 
 from antdrive.robots import Footprint, PurePursuit, footprint_clearance
 from antdrive.robots.control._kernels_avoidance import AvoidanceWeights, Encounter, among_movers, progress_by_distance
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, index_discs
 from antdrive.robots.control._kernels_path import PathSamples, clear_lookaheads, project
 from antdrive.robots.control._kernels_pursuit import rotation, slow_for_curvature
 from antdrive.worlds import Disc, Route, World
@@ -58,21 +58,6 @@ def test_lookaheads_end_where_the_line_to_the_carrot_would_come_too_close():
                 break
             expected = step
         assert length == pytest.approx(expected), i * spacing
-
-
-def test_an_arc_is_as_far_from_large_discs_as_its_points_are():
-    rng = np.random.default_rng(8)
-    for _ in range(60):
-        curvature, sweep = rng.uniform(0.2, 2.0) * rng.choice([-1, 1]), rng.uniform(0.05, 3.0)
-        sweep = math.copysign(sweep, curvature)
-        x, y, yaw = rng.uniform((-1, -1, -3), (1, 1, 3))
-        turned = yaw + np.linspace(0, sweep, 4001)
-        xs = x + (np.sin(turned) - math.sin(yaw)) / curvature
-        ys = y - (np.cos(turned) - math.cos(yaw)) / curvature
-        discs = rng.uniform((-6, -6, 0.05), (6, 6, 3.0), (3, 3))
-        expected = min((np.hypot(xs - d[0], ys - d[1]) - d[2]).min() for d in discs)
-        found = arc_clearance(x, y, yaw, curvature, sweep, xs[-1], ys[-1], discs, WIDE, math.inf)
-        assert found == pytest.approx(expected, abs=1e-5)
 
 
 def test_a_route_is_as_long_as_its_segments(turtlebot):

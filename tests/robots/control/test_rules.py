@@ -206,7 +206,7 @@ def sampled_arc(yaw, curvature, sweep):
     yaw=st.floats(-3.1, 3.1),
     curvature=st.floats(0.2, 5).flatmap(lambda c: st.sampled_from([c, -c])),
     angle=st.floats(0.01, 2.8),
-    disc=st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.05, 0.5)),
+    disc=st.tuples(st.floats(-6, 6), st.floats(-6, 6), st.floats(0.05, 3.0)),
 )
 def test_an_arcs_clearance_is_that_of_its_points(yaw, curvature, angle, disc):
     sweep = math.copysign(angle, curvature)

@@ -319,7 +319,7 @@ def test_points_on_ground_that_was_free_are_not_explained_until_they_settle():
 def test_between_whole_scans_only_hits_are_entered(jackal):
     post, late = np.array([[2.0, 0.0, 0.2]]), np.array([[2.0, 0.0, 0.2], [1.0, 0.5, 0.1]])
     grid = OccupancyMap(jackal.lidar)
-    assert (grid.share, grid.turns) == (4, 2)
+    assert (grid.share, grid.stride) == (4, 2)
     for number in range(9):  # the second post comes between two whole scans
         scanner = Scanner(jackal.lidar, post if number < 2 else late)
         ranges = scanner.scan((0.0, 0.0, 0.0), rng=np.random.default_rng(number))
