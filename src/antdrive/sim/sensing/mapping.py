@@ -334,51 +334,6 @@ def _read_only(array: Mask) -> Mask:
     return view
 
 
-def clear_distance(
-    seen: OccupancyMap,
-    pose: Pose,
-    speed: float,
-    yaw_rate: float,
-    footprint: Footprint,
-    limit: float,
-    *,
-    freespace: bool = False,
-) -> float:
-    """Return how far the footprint, swept along a twist's arc, stays on observed free ground, at most `limit` [m].
-
-    Unknown ground counts by whole cells, hits by their discs. The result is a lower bound, to 1 mm. An overlap at the
-    start stops only a motion that comes nearer to it.
-
-    Args:
-        seen: the map
-        pose: the robot's estimated pose
-        speed: forward speed [m/s], not 0; negative: backwards
-        yaw_rate: counter-clockwise [rad/s]
-        footprint: the robot's footprint
-        limit: the largest distance of interest [m]
-        freespace: whether unknown ground counts as free, so that only hits limit the path
-    """
-    if speed == 0.0:
-        return 0.0 if yaw_rate else limit
-    return clear_way(seen, pose, speed, yaw_rate, shape_of(footprint), limit, freespace=freespace)
-
-
-def clear_turn(
-    seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footprint, limit: float, *, freespace: bool = False
-) -> float:
-    """Return how far the robot can turn on the spot over observed free ground, at most `limit` [rad], as `clear_distance`.
-
-    Args:
-        seen: the map
-        pose: the robot's estimated pose
-        yaw_rate: counter-clockwise [rad/s]; only its sign counts
-        footprint: the robot's footprint
-        limit: the largest angle of interest [rad]
-        freespace: whether unknown ground counts as free
-    """
-    return clear_way(seen, pose, 0.0, yaw_rate, shape_of(footprint), limit, freespace=freespace)
-
-
 def clear_way(
     seen: OccupancyMap,
     pose: Pose,
@@ -389,7 +344,20 @@ def clear_way(
     *,
     freespace: bool = False,
 ) -> float:
-    """Return `clear_distance` of a robot with a speed, `clear_turn` of one without, for a footprint's `shape_of`."""
+    """Return how far the footprint, swept along a twist's arc, stays on observed free ground [m]; without a speed [rad].
+
+    Unknown ground counts by whole cells, hits by their discs. The result is a lower bound, to 1 mm. An overlap at the
+    start stops only a motion that comes nearer to it.
+
+    Args:
+        seen: the map
+        pose: the robot's estimated pose
+        speed: forward speed [m/s]; negative: backwards; 0: a turn on the spot
+        yaw_rate: counter-clockwise [rad/s]
+        shape: the robot's footprint, from `shape_of`
+        limit: the largest distance or angle of interest [m], [rad]
+        freespace: whether unknown ground counts as free, so that only hits limit the path
+    """
     arrays = tuple(seen.arrays._replace(free=~seen.occupied)) if freespace else seen.plain
     length, width, rounding, corners = shape
     clear: float = _kernels_sight.clear_way(*pose, speed, yaw_rate, length, width, rounding, corners, limit, arrays)
