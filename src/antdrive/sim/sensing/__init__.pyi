@@ -7,4 +7,3 @@ from .tracking import KnownGround as KnownGround
 from .tracking import MappedGround as MappedGround
 from .tracking import MoverTracker as MoverTracker
 from .tracking import TrackedMovers as TrackedMovers
-from .tracking import TrackingPolicy as TrackingPolicy

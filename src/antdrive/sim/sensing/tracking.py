@@ -11,14 +11,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Pose
-from antdrive.base.errors import FieldError, require
 from antdrive.robots.control import _kernels_obstacles
 from antdrive.robots.control.pursuit import SQUARE, indexed_obstacles
 from antdrive.robots.lidar import Lidar
@@ -130,7 +128,9 @@ def ends(lidar: Lidar, pose: Pose, ranges: Floats, beams: npt.NDArray[np.intp]) 
 
 SKIN = kernels.SKIN
 ROOM = 64  # initial capacity for tracks
+ERROR = 0.01  # standard deviation of a measured centre, without the lidar's own [m]
 PARTIAL = 3.0  # factor on the error of a partly hidden mover's centre
+ACCELERATION = 3.0  # standard deviation of the movers' acceleration [m/s^2]
 
 
 class TrackedMovers(NamedTuple):
@@ -151,93 +151,39 @@ class TrackedMovers(NamedTuple):
     met: npt.NDArray[np.bool_]
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrackingPolicy:
-    """Parameters of mover tracking.
-
-    Attributes:
-        gap: neighbouring points farther apart belong to different objects [m]
-        least: minimum number of points that starts a track
-        settle: time after which an object on formerly free ground belongs to the occupancy map [s]
-        smallest: least estimated radius [m]
-        largest: largest estimated radius [m]
-        gate: largest distance between a cluster and a track's prediction [m]
-        speed: highest speed of a mover, which widens the gate of a new track [m/s]
-        acceleration: standard deviation of the movers' acceleration [m/s^2]
-        error: standard deviation of a measured centre, without the lidar's own [m]
-        confirmed: scans that must hit a mover before it counts
-        way: distance that a mover must cover before it counts [m]; 0 on a given map
-        patience: time for which an occluded track is kept [s]
-        doubt: the same for an unconfirmed track [s]
-
-    Raises:
-        FieldError: a value is not positive.
-    """
-
-    gap: float = 0.2
-    least: int = 3
-    settle: float = 2.0
-    smallest: float = 0.05
-    largest: float = 1.0
-    gate: float = 0.4
-    speed: float = 2.0
-    acceleration: float = 3.0
-    error: float = 0.01
-    confirmed: int = 3
-    way: float = 0.12
-    patience: float = 3.0
-    doubt: float = 0.5
-
-    def __post_init__(self) -> None:
-        for key, value in vars(self).items():
-            require(key, value, above=0)
-        if not self.smallest <= self.largest:
-            raise FieldError("smallest", f"must be at most largest, {self.largest:g}, got {self.smallest:g}")
-
-
 class MoverTracker:
     """Mover tracker over the scans of one drive.
 
     Attributes:
-        policy: the tracking policy
+        rules: the tracking rules, on a complete map (True) and on the robot's own (False)
 
     Args:
         lidar: the scanning lidar
-        policy: the tracking policy; None: the default
         pose_xy: standard deviation of the estimated positions [m]
         pose_yaw: standard deviation of the estimated headings [rad]
     """
 
-    def __init__(
-        self, lidar: Lidar, policy: TrackingPolicy | None = None, pose_xy: float = 0.0, pose_yaw: float = 0.0
-    ) -> None:
-        self.policy = policy or TrackingPolicy()
-        self._lidar, self._pose_xy, self._pose_yaw = lidar, pose_xy, pose_yaw
-        self._rules = {complete: self._rules_where(complete) for complete in (False, True)}
-        self._tracks, self._count = np.zeros(ROOM, dtype=kernels.TRACK), 0
-        self._time = -math.inf
-        self._found = 0
-        self._usual = np.array((self.policy.smallest, 0.0))
-        self._now: TrackedMovers = _listed(self._tracks[:0], self._time)
-
-    def _rules_where(self, complete: bool) -> kernels.TrackingRules:
-        policy, lidar = self.policy, self._lidar
+    def __init__(self, lidar: Lidar, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
+        self._lidar = lidar
         measured = lidar.sigma**2 + lidar.resolution**2 / 12
-        own = {key: value for key, value in vars(policy).items() if key in kernels.TrackingRules._fields}
-        return kernels.TrackingRules(
-            **{key: type(getattr(TrackingPolicy, key))(value) for key, value in own.items()},  # kernels tell 2 from 2.0
-            whole=policy.error**2 + measured,
-            part=(PARTIAL * policy.error) ** 2 + measured,
-            pose_xy=float(self._pose_xy) ** 2,
-            pose_yaw=float(self._pose_yaw),
-            power=2.0,
+        rules = kernels.TrackingRules(
+            whole=ERROR**2 + measured,
+            part=(PARTIAL * ERROR) ** 2 + measured,
+            pose_xy=float(pose_xy) ** 2,
+            pose_yaw=float(pose_yaw),
             spacing=lidar.spacing,
             first=float(lidar.angles[0]) - lidar.yaw,
             reach=float(lidar.max_range),
             rate=float(lidar.rate),
             closed=bool(lidar.full_circle),
-            complete=complete,
+            complete=True,
         )
+        self.rules = {True: rules, False: rules._replace(complete=False)}
+        self._tracks, self._count = np.zeros(ROOM, dtype=kernels.TRACK), 0
+        self._time = -math.inf
+        self._found = 0
+        self._usual = np.array((rules.smallest, 0.0))
+        self._now: TrackedMovers = _listed(self._tracks[:0], self._time)
 
     @property
     def tracks_begun(self) -> int:
@@ -261,7 +207,7 @@ class MoverTracker:
         """
         dt = time - self._time if math.isfinite(self._time) else 0.0
         self._time = time
-        power = self.policy.acceleration * self.policy.acceleration
+        power = ACCELERATION * ACCELERATION
         kernels.predict(self._tracks, self._count, dt, power, power * dt**4 / 4, power * dt**3 / 2)
         hits = ground.hits(pose, ranges)
         points, explained = np.ascontiguousarray(hits.points), np.ascontiguousarray(hits.explained)
@@ -271,7 +217,7 @@ class MoverTracker:
         eye = np.array(self._lidar.pose_on(pose))
         view = kernels.View(points, hits.beams, explained, owner, np.ascontiguousarray(ranges), eye, float(time))
         self._count, self._found = kernels.read(
-            view, self._rules[ground.complete], self._tracks, self._count, self._found, self._usual
+            view, self.rules[ground.complete], self._tracks, self._count, self._found, self._usual
         )
         tracks = self._tracks[: self._count]
         self._now = _listed(tracks[tracks["sure"] & (tracks["moves"] | ground.complete)], self._time)
@@ -293,14 +239,14 @@ class MoverTracker:
         points, explained = np.ascontiguousarray(hits.points), np.ascontiguousarray(hits.explained)
         mine = np.empty(len(points), dtype=np.bool_)
         dt = time - self._time if self._count else 0.0
-        kernels.suspects(self._tracks, self._count, dt, float(time), self.policy.settle, points, explained, mine)
+        kernels.suspects(self._tracks, self._count, dt, float(time), self.rules[True].settle, points, explained, mine)
         out = np.zeros(len(ranges), dtype=np.bool_)
         out[hits.beams[mine]] = True
         return out
 
     def _make_room(self, points: int) -> None:
         """Grow the track array to hold all tracks that a scan may start."""
-        needed = self._count + points // self.policy.least + 1
+        needed = self._count + points // self.rules[True].least + 1
         if needed > len(self._tracks):
             longer = np.zeros(2 * needed, dtype=kernels.TRACK)
             longer[: self._count] = self._tracks[: self._count]
