@@ -181,7 +181,7 @@ def _mover_detector(s: Scenario) -> MoverDetector:
     """Create the detection of movers and unknown obstacles for a robot with a map."""
     noise, lidar = s.robot.noise.scaled(s.noise), _lidar(s)
     errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
-    ground = KnownGround(lidar, s.task.world, math.inf, *errors)
+    ground = KnownGround(lidar, s.task.world, *errors)
     return MoverDetector(_sensor(s), ground, MoverTracking(lidar, s.control_hz, *errors))
 
 

@@ -56,21 +56,17 @@ class KnownGround:
     Args:
         lidar: the robot's lidar; cylinders below its beams do not count
         world: the map; its movers do not count
-        reach: hits farther than this from the lidar are omitted [m]
         pose_xy: standard deviation of the estimated position [m]
         pose_yaw: standard deviation of the estimated heading [rad]
     """
 
     complete = True
 
-    def __init__(
-        self, lidar: Lidar, world: World, reach: float = math.inf, pose_xy: float = 0.0, pose_yaw: float = 0.0
-    ) -> None:
+    def __init__(self, lidar: Lidar, world: World, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
         tall = tuple(disc for disc in world.obstacles if disc.height >= lidar.height)
-        self._lidar, self._reach = lidar, min(reach, lidar.max_range)
-        self._pose_xy, self._pose_yaw = pose_xy, pose_yaw
+        self._lidar, self._pose_xy, self._pose_yaw = lidar, pose_xy, pose_yaw
         world = dataclasses.replace(world, obstacles=tall, movers=())
-        most = float(self._slack(np.array(self._reach)))
+        most = float(self._slack(np.array(lidar.max_range)))
         self._obstacles = indexed_obstacles(world, most, max(most, SQUARE))
 
     def hits(self, pose: Pose, ranges: Floats) -> Hits:
@@ -80,7 +76,7 @@ class KnownGround:
             pose: the robot's estimated pose
             ranges: the scan (beams,) [m]
         """
-        beams = np.flatnonzero(np.isfinite(ranges) & (ranges <= self._reach))
+        beams = np.flatnonzero(np.isfinite(ranges) & (ranges <= self._lidar.max_range))
         points, explained = ends(self._lidar, pose, ranges, beams), np.empty(len(beams), dtype=np.bool_)
         _kernels_obstacles.points_within(points, self._slack(ranges[beams]), self._obstacles, explained)
         return Hits(beams, points, explained)
