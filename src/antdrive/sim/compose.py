@@ -52,18 +52,17 @@ class Parts(NamedTuple):
     rules: tuple[Rule, ...]  # in order of application
     logs: tuple[Logs, ...]
     limiters: tuple[str, ...]  # names of the rules that limit the speed
-    mapped: bool  # whether plans use the given map
 
 
 def compose(s: Scenario) -> Parts:
     """Select the parts of a scenario's drive."""
     perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
-    tracks_movers, mapped = perception.kind == "lidar", s.map == "given"
+    tracks_movers, mapless = perception.kind == "lidar", s.mapless
     moving = s.moving
-    start, mapless = s.task.start, not mapped
+    start = s.task.start
     localiser = localiser_of(s.localisation, s.robot, s.noise, s.odometry, 1 / hz, start, s.seed, mapless=mapless)
-    survey = None if mapped else _survey(s, tracks_movers, matching=localiser.matched)
-    scans = _mover_detector(s) if mapped and tracks_movers else survey
+    survey = _survey(s, tracks_movers, matching=localiser.matched) if mapless else None
+    scans = _mover_detector(s) if not mapless and tracks_movers else survey
     tracking = scans.tracking if scans else None
     movers: PerceivedMovers = (
         Tracked(tracking, perception, hz) if tracking else GroundTruth(s.trajectories, perception, hz)
@@ -80,7 +79,7 @@ def compose(s: Scenario) -> Parts:
     if s.timed:
         rules.append(KeepToSchedule(guide, s.robot, hz))
     if moving and avoidance is not None:
-        if mapped and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
+        if not mapless and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
             rules.append(SlowAtCorners(tracking, s.robot, hz, reaction))
         drifts = survey is not None and tracks_movers
         share = DRIFTING_SHARE if drifts else GOAL_SHARE
@@ -103,7 +102,6 @@ def compose(s: Scenario) -> Parts:
         tuple(rules),
         tuple(part for part in (localiser, guide, scans, tracking) if part is not None),
         limiters=EXPLORING_LIMITERS if survey else LIMITERS,
-        mapped=mapped,
     )
 
 
@@ -117,7 +115,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
     return RoutePlanner(
         planner=s.planner,
         planner_label=s.planner_label,
-        task=s.task if s.map == "given" else mapless_task(s.task),
+        task=mapless_task(s.task) if s.mapless else s.task,
         robot=s.robot,
         controller=s.controller,
         margin=s.planned_margin,
@@ -130,7 +128,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
         seed=s.seed,
         noise=s.noise,
         motions=s.trajectories.motions if s.timed else (),
-        mapped=s.map == "given",
+        mapless=s.mapless,
         whole=not s.cell_by_cell,
     )
 
@@ -183,7 +181,7 @@ def _mover_detector(s: Scenario) -> MoverDetector:
     """Create the detection of movers and unknown obstacles for a robot with a map."""
     noise, lidar = s.robot.noise.scaled(s.noise), _lidar(s)
     errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
-    ground = KnownGround(lidar, s.task.world, math.inf, *errors)
+    ground = KnownGround(lidar, s.task.world, *errors)
     return MoverDetector(_sensor(s), ground, MoverTracking(lidar, s.control_hz, *errors))
 
 

@@ -28,18 +28,7 @@ from antdrive.sim.driving.parts import RouteGuide, Rows
 from antdrive.sim.driving.recovery import TRAIL, Recovery, ScanTurn
 from antdrive.sim.driving.routes import RoutePlanner, bounds_of
 from antdrive.sim.driving.survey import PATIENCE, ROUTE_CHECK_STEP, RoutePoints, Survey, table_logged
-from antdrive.sim.policy import (
-    BACKED,
-    DISCOVERED,
-    HELD,
-    LOST,
-    MADE_ROOM,
-    MISSED,
-    SCANNED,
-    STALLED,
-    STRAYED,
-    ReplanPolicy,
-)
+from antdrive.sim.policy import ReplanPolicy, Trigger
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
 
@@ -297,7 +286,7 @@ class Exploration(RouteGuide):
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
         """Return a new path to a missed goal, unless a search or scan turn is under way."""
-        return None if self.may_wait else self.replan(tick, pose, MISSED)
+        return None if self.may_wait else self.replan(tick, pose, Trigger.MISSED)
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Return the trigger of a new route; empty if none is due."""
@@ -306,20 +295,20 @@ class Exploration(RouteGuide):
             self._movers.observe(tick, pose, waiting)
         recovery = self._recovery
         if recovery.scan_turn is not None:
-            return SCANNED if recovery.scan_turn.done else ""
+            return Trigger.SCAN_TURN if recovery.scan_turn.done else ""
         if self.lost:
-            return LOST if now - self._planned_at >= INTERVAL else ""
+            return Trigger.LOST if now - self._planned_at >= INTERVAL else ""
         turns = tracked.route.turns is not None
         recovery.note_progress(now, pose, waiting=waiting, backwards=tracked.backwards, turns=turns)
         if tracked.route is recovery.route:
             over = tracked.length - arc < 2 * TRAIL or recovery.stalled(now)
-            return (BACKED if tracked.backwards else MADE_ROOM) if over else ""
+            return (Trigger.BACKED_OFF if tracked.backwards else Trigger.MADE_ROOM) if over else ""
         if now - self._planned_at < INTERVAL:
             return ""
         if recovery.stalled(now):
-            return STALLED
+            return Trigger.STALLED
         if recovery.held(now, pose):
-            return HELD
+            return Trigger.CONSTRAINED
         if self._movers is not None and now - self._planned_at >= self._policy.min_interval:
             due = self._movers.trigger(tick, pose, tracked, arc)
             if due:
@@ -331,20 +320,20 @@ class Exploration(RouteGuide):
         path = tracked.samples.xy, tracked.samples.arc
         place, hit = self.survey.check(path, self._points, arc, int(arc / ROUTE_CHECK_STEP))
         if math.dist(place, pose[:2]) > self._policy.max_deviation:
-            return STRAYED
-        return DISCOVERED if hit else ""
+            return Trigger.STRAYED
+        return Trigger.DISCOVERED if hit else ""
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """Return a new path from a pose; None if there is none, or a scan turn comes first."""
         now, spent = tick / self._hz, clock()
         self._planned_at, self._tick = now, tick
-        if trigger in (STALLED, HELD, BACKED, MADE_ROOM, SCANNED):
+        if trigger in (Trigger.STALLED, Trigger.CONSTRAINED, Trigger.BACKED_OFF, Trigger.MADE_ROOM, Trigger.SCAN_TURN):
             recovers, way = self._recovered(now, pose, trigger)
             if way is not None:
                 self.note(now, trigger, spent(), 0, way.length, way.route.xy)
             if recovers:
                 return way
-        if self._failures >= PATIENCE and trigger != SCANNED:
+        if self._failures >= PATIENCE and trigger != Trigger.SCAN_TURN:
             self._failures = 0
             self.survey.reset(pose)
         grid, plan, avoided = self._plan_around(tick, pose, trigger)
@@ -365,18 +354,18 @@ class Exploration(RouteGuide):
     def _recovered(self, now: float, pose: Pose, trigger: str) -> tuple[bool, TrackedPath | None]:
         """Start a recovery; return whether it replaces planning, and the path that it follows."""
         recovery = self._recovery
-        if trigger == SCANNED:
+        if trigger == Trigger.SCAN_TURN:
             recovery.end_scan_turn(now, pose)
             return False, None
-        if trigger in (BACKED, MADE_ROOM):
+        if trigger in (Trigger.BACKED_OFF, Trigger.MADE_ROOM):
             recovery.note_rest(now, pose)
-        if trigger == STALLED:
+        if trigger == Trigger.STALLED:
             recovery.note_stall(now, pose)
-        if (trigger != STALLED or recovery.held_by_unknown(pose)) and recovery.begin_scan_turn(pose):
+        if (trigger != Trigger.STALLED or recovery.held_by_unknown(pose)) and recovery.begin_scan_turn(pose):
             return True, None
-        if trigger == HELD:
+        if trigger == Trigger.CONSTRAINED:
             return True, None
-        route = recovery.escape(pose) if trigger == STALLED else None
+        route = recovery.escape(pose) if trigger == Trigger.STALLED else None
         if route is None:
             return False, None
         way = self._prepare(route, SEEN.among(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)

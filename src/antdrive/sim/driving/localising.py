@@ -191,5 +191,5 @@ def logged_localiser(record: DriveRecord) -> Exact | Fixes:
     """Create the localiser of a logged drive."""
     odometry = 1.0 if record.sensing is None else record.sensing.odometry
     period, start = 1 / record.control_hz, record.task.start
-    kind, mapless = record.localisation, record.exploring
+    kind, mapless = record.localisation, record.mapless
     return localiser_of(kind, record.robot, record.noise, odometry, period, start, record.seed, mapless=mapless)

@@ -57,7 +57,7 @@ class Moment(NamedTuple):
 
 
 class Plant(Protocol):
-    """Robot that executes twists: in physics (`Bullet`), exactly (`Kinematic`), or from a log (`Logged`)."""
+    """Robot that executes twists: in physics (`Bullet`) or exactly (`Kinematic`)."""
 
     state: State  # true pose and velocity
 
@@ -175,7 +175,9 @@ class Guide(Protocol):
         """Log a search for a new route (N, 2) [m] and the plan's cost [m]."""
         points = tuple(map(tuple, np.round(xy, 4).tolist()))
         self.log.append(
-            ReplanRecord(t=t, trigger=trigger, solved=len(xy) > 0, cost_m=finite_or_none(cost), work=work, route=points)
+            ReplanRecord(
+                t=t, trigger=str(trigger), solved=len(xy) > 0, cost_m=finite_or_none(cost), work=work, route=points
+            )
         )
         self.walls.append(wall_s)
 
@@ -201,7 +203,7 @@ class Rule(Protocol):
 
 
 class Decider(Protocol):
-    """Source of commands: a `Driver`, a rehearsal or a log."""
+    """Source of commands: a `Driver` or a rehearsal."""
 
     step: Step  # the current step
 

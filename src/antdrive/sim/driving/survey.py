@@ -19,7 +19,7 @@ from antdrive.sim.driving.parts import Rows
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import scans_logged
 from antdrive.sim.log.streams import random_stream
-from antdrive.sim.policy import SCANNED
+from antdrive.sim.policy import Trigger
 from antdrive.sim.sensing.mapping import OccupancyMap, clear_way, shape_of
 from antdrive.sim.sensing.matching import FAR, ScanMatcher, without_sliding
 from antdrive.sim.sensing.scanner import Scanner
@@ -56,7 +56,7 @@ def reset_ticks(record: DriveRecord) -> Iterator[int]:
     """Yield the control periods in which a mapless robot reset its map, after `PATIENCE` failed plans in a row."""
     failures = 0
     for replan in record.replans:
-        if failures >= PATIENCE and replan.trigger != SCANNED:
+        if failures >= PATIENCE and replan.trigger != Trigger.SCAN_TURN:
             failures = 0
             yield round(replan.t * record.control_hz)
         failures = 0 if replan.solved else failures + 1
@@ -100,12 +100,12 @@ class MoverTracking:
 
     def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
         lidar = lidar.at(hz)
-        self.tracker, self.tick = MoverTracker(lidar, None, pose_xy, pose_yaw), 0
+        self.tracker, self.tick = MoverTracker(lidar, pose_xy, pose_yaw), 0
         self.sight, self.reach = 0.0, min(lidar.max_range, MAP_CELL / lidar.spacing)
         self._last: tuple[Pose, Floats, npt.NDArray[np.bool_]] | None = None
         self._known_corners: Floats | None = None
         self._hz, self._spacing, self._lidar = hz, lidar.spacing, lidar
-        self._settle = max(2, round(self.tracker.policy.settle * lidar.rate))
+        self._settle = max(2, round(self.tracker.rules[False].settle * lidar.rate))
         self._log: list[tuple[int, TrackedMovers]] = []
 
     def read(self, ground: Ground, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:

@@ -68,7 +68,7 @@ def _static(body: RobotFrames, start: float) -> Any:
 
 def _maps(rollout: Rollout) -> list[Topic]:
     """Return the true obstacles and the planner's grid, once, or a mapless robot's growing occupancy map."""
-    if not rollout.record.exploring:
+    if not rollout.record.mapless:
         topics = {"/map": [wall_map(rollout)], "/global_costmap/costmap": [planning_grid(rollout)]}
     else:
         topics = {"/map": list(occupancy_maps(rollout))} if len(rollout.scans) else {}
