@@ -241,8 +241,8 @@ class Scenario(Settings):
     def as_dict(self) -> dict[str, Any]:
         """Return the settings as plain values, for JSON; `docs/reference/rollout-format.md` lists the keys.
 
-        `settings` holds the non-default values of controller, perception, avoidance and replanning, null where there is none,
-        and the unseen obstacles.
+        `settings` holds the unseen obstacles and the non-default values of all settings without a key of their own, null where
+        there is none.
         """
         task, planner = self.task, self.planner
         changed: dict[str, Any] = {}
@@ -254,6 +254,7 @@ class Scenario(Settings):
             changed |= settings_of(self.sensing)
         if self.unseen:
             changed["unseen"] = [[disc.x, disc.y, disc.radius] for disc in self.unseen]
+        changed |= self.other_settings or {}
         return {
             "world": task.world.name,
             "planner": self.planner_label,
