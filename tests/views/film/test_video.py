@@ -5,6 +5,7 @@ import re
 import subprocess
 import tracemalloc
 from dataclasses import replace
+from types import MappingProxyType
 
 import imageio_ffmpeg
 import numpy as np
@@ -17,7 +18,7 @@ from antdrive.sim.log.record import ComponentRecord, ReplanRecord
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 from antdrive.views.colours import OUTCOME_LABELS
-from antdrive.views.film import film_options, overlay, playback, prelude, video
+from antdrive.views.film import overlay, playback, prelude, video
 from antdrive.views.film.comparison_film import SplitScreen, compare_film
 from antdrive.views.film.compositor import has_glow
 from antdrive.views.film.overlay import Layout, _entry_width, banner, legend_entries, legend_rows
@@ -237,8 +238,8 @@ def test_a_failure_in_the_middle_leaves_no_file(drive, tmp_path, monkeypatch):
 
 
 def test_an_encoder_that_dies_is_reported(drive, tmp_path, monkeypatch):
-    broken = film_options.ENCODERS[".mp4"]._replace(options=("-c:v", "no-such-codec"))
-    monkeypatch.setitem(film_options.ENCODERS, ".mp4", broken)
+    broken = MappingProxyType({".mp4": ("-c:v", "no-such-codec")})
+    monkeypatch.setattr(video, "ENCODERS", broken)
     with pytest.raises(InputError, match=r"drive\.mp4: cannot be written \(.*no-such-codec"):
         film(drive, tmp_path / "drive.mp4", size=SIZE)
     assert not list(tmp_path.iterdir())
