@@ -20,7 +20,8 @@ from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.success import StepCurve, distributions, performance_profiles
 from antdrive.views.colours import INK, MUTED, LabelStyle, hexed
 from antdrive.views.figures.canvas import PRINTED, new_figure, save_figure, styled
-from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics, measure_title
+from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics
+from antdrive.views.pages.rendering import Quantity, measure_title
 
 WORST = 10_000.0  # right end of a profile, as a multiple of the best value
 WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]
@@ -332,7 +333,7 @@ def _svg(figure: Figure, styles: Sequence[LabelStyle]) -> str:
 
 
 def _plain(name: str) -> str:
-    return measure_title(name).partition(" [")[0]
+    return Quantity.of(name).title
 
 
 def _round(value: float) -> str:

@@ -7,32 +7,28 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from antdrive.runs.statistics.comparison import ALPHA, SUCCESS, PairedComparison
 from antdrive.runs.statistics.pairing import PairedRuns
-from antdrive.views.pages.rendering import percent, percents, probability, short
+from antdrive.views.pages.rendering import Quantity, percent, percents, probability
 
 
-def quotes(paired: PairedRuns, title: str, rows: Sequence[PairedComparison]) -> Iterator[str]:
+def quotes(paired: PairedRuns, rows: Sequence[PairedComparison]) -> Iterator[str]:
     """Yield a sentence about each pair with the reference planner; of all pairs, about the one with the smallest p."""
     tested = _tested(rows)
     if not tested:
         return
     shared = set.intersection(*({row.first, row.second} for row in tested))
     for row in tested if shared else [min(tested, key=lambda one: one.decisive_p)]:
-        yield _sentence(paired, title, row, len(tested))
+        yield _sentence(paired, row, len(tested))
 
 
 def disagreements(tables: Mapping[str, Sequence[PairedComparison]]) -> Iterator[str]:
-    """Yield a sentence for every cause of an interval and a p that disagree, with the pairs and measures.
-
-    Args:
-        tables: the comparisons by title of their measure
-    """
+    """Yield a sentence for every cause of an interval and a p that disagree, with the pairs and measures."""
     where: dict[str, dict[str, list[str]]] = {}
-    for title, rows in tables.items():
+    for measure, rows in tables.items():
         tested = _tested(rows)
         for one in tested:
             if why := _disagreement(one, len(tested)):
                 pair = f"{one.first} and {one.second}"
-                where.setdefault(why, {}).setdefault(pair, []).append(title.partition(" [")[0])
+                where.setdefault(why, {}).setdefault(pair, []).append(Quantity.of(measure).title)
     for why, pairs in where.items():
         places = "; ".join(f"{pair}: {', '.join(titles)}" for pair, titles in pairs.items())
         yield f"{why} ({places})."
@@ -42,7 +38,7 @@ def _tested(rows: Sequence[PairedComparison]) -> list[PairedComparison]:
     return [row for row in rows if not math.isnan(row.decisive_p)]
 
 
-def _sentence(paired: PairedRuns, title: str, row: PairedComparison, tested: int) -> str:
+def _sentence(paired: PairedRuns, row: PairedComparison, tested: int) -> str:
     """Return the size of the difference with its interval, tests and correction."""
     tests = [
         "exact McNemar test" if row.measure == SUCCESS else "Wilcoxon's signed rank test",
@@ -54,10 +50,10 @@ def _sentence(paired: PairedRuns, title: str, row: PairedComparison, tested: int
         if not math.isnan(p)
     ]
     over = f"n = {_counted(row.pairs, 'pair')} in {_counted(row.worlds, 'world')}"
-    return f"{_effect(paired, title, row, over)}; {', '.join(found)} (Holm, {_counted(tested, 'pair')})."
+    return f"{_effect(paired, row, over)}; {', '.join(found)} (Holm, {_counted(tested, 'pair')})."
 
 
-def _effect(paired: PairedRuns, title: str, row: PairedComparison, over: str) -> str:
+def _effect(paired: PairedRuns, row: PairedComparison, over: str) -> str:
     """Return the size of the difference with its interval."""
     i, j = paired.planners.index(row.first), paired.planners.index(row.second)
     mask = paired.counted(i, j)
@@ -69,11 +65,12 @@ def _effect(paired: PairedRuns, title: str, row: PairedComparison, over: str) ->
             f"{row.first} succeeded in {shares[0]} % and {row.second} in {shares[1]} % of {over}: difference "
             f"{percent(row.difference)} points, 95 % interval {percents(row.interval)} ({method})"
         )
-    name, _, unit = title.removesuffix("]").partition(" [")
-    median = f"{short(row.difference)} {unit}".rstrip()
+    quantity = Quantity.of(row.measure, [row.difference])
+    median = f"{quantity.text(row.difference)} {quantity.unit}".rstrip()
+    low, high = map(quantity.text, row.interval)
     return (
-        f"{name}, {row.first} minus {row.second}: median {median} over {over} that both "
-        f"solved, 95 % interval {short(row.interval.low)} to {short(row.interval.high)} (bootstrap over worlds)"
+        f"{quantity.title}, {row.first} minus {row.second}: median {median} over {over} that both "
+        f"solved, 95 % interval {low} to {high} (bootstrap over worlds)"
     )
 
 
