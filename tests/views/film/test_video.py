@@ -115,22 +115,6 @@ def test_the_band_fits_every_size(drive, size):
     assert shot.frame(0.5).shape == (size[1], size[0], 3)
 
 
-def test_a_band_does_not_depend_on_what_it_showed_before(drive):
-    def band():
-        return Shot(drive, camera="top", size=SIZE, note="certified")._band
-
-    shown = [(9.96, 0.5, 0.123, 0.1), (10.0, 0.5, 12.123, -0.01), (10.1, 1.25, 0.123, -0.01), (10.1, 1.0, 0.1, -0.01)]
-    kept = band()
-    before = None
-    for numbers, status in zip(shown, [overlay.SLOWED, overlay.DRIVING, overlay.DRIVING, overlay.SLOWED], strict=True):
-        pictures = [np.zeros((kept.layout.height, SIZE[0], 3), dtype=np.uint8) for _ in range(2)]
-        for one, picture in zip((kept, band()), pictures, strict=True):
-            one.draw(overlay.drive_values(*numbers), status, picture)
-        assert np.array_equal(*pictures)
-        assert before is None or (pictures[0] != before).any()
-        before = pictures[0]
-
-
 DRIFTED = (
     "the robot believed that it was at the goal, 0.01 m from it, but was 1.411 m from it (the tolerance is 1 m): "
     "its estimate was wrong by 1.42 m"

@@ -77,9 +77,10 @@ def samples(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[Topi
     still = np.zeros((*rollout.movers.shape[:2], 1))
     movers = world_to_map(frame, np.concatenate([rollout.movers, still], axis=2))
     robot = np.stack([measured.pose, relative_frame(measured.pose, believed), truth], axis=1)
+    moving = np.concatenate([robot, movers], axis=1)
     none = np.zeros((len(stamps), 3, 3))
     topics = [
-        transforms("/tf", stamps, frames, np.concatenate([robot, movers], axis=1)),
+        transforms("/tf", stamps, frames, _pose7(moving.reshape(-1, 3)).reshape(*moving.shape[:2], 7)),
         odometry(
             "/odom",
             (ODOM, body.base),
@@ -149,7 +150,7 @@ def joint_states(topic: str, stamps: Ints, rollout: Rollout, measured: LoggedOdo
 
 
 def transforms(topic: str, stamps: Ints, frames: Sequence[tuple[str, str]], poses: Floats) -> Topic:
-    """Return messages of transforms between frames."""
+    """Return messages of transforms (N, F, 7) between frames: positions [m] and quaternions."""
     layout = CdrLayout()
     layout.length(len(frames))
     values: dict[str, Any] = {}
@@ -157,7 +158,7 @@ def transforms(topic: str, stamps: Ints, frames: Sequence[tuple[str, str]], pose
         _header(layout, parent, str(i))
         layout.text(child)
         layout.number(f"pose{i}", "f8", 7)
-        values |= _stamp_values(stamps, str(i)) | {f"pose{i}": _pose7(poses[:, i])}
+        values |= _stamp_values(stamps, str(i)) | {f"pose{i}": poses[:, i]}
     return Topic(topic, "tf2_msgs/msg/TFMessage", stamps, layout.messages(values))
 
 

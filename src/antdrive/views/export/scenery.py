@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from antdrive.base.plane import world_to_map
 from antdrive.base.types import Floats, Pose
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.export.robot_frames import RobotFrames, quaternion
+from antdrive.views.export.samples import transforms
 from antdrive.views.export.topics import MAP, Topic, message_types, mover_frame, nanoseconds
 from antdrive.views.scene import Scene, contact_point
 from antdrive.worlds.world import World
@@ -26,7 +27,9 @@ FLAT, LINE, SPOT = 0.01, 0.05, 0.1  # height of the goal, width of a line, size 
 def scenery(rollout: Rollout, body: RobotFrames) -> tuple[Topic, list[Topic]]:
     """Return the static transforms, sent at the first row, and the other topics with few messages."""
     start = float(rollout.t[0])
-    static = _message("/tf_static", "tf2_msgs/msg/TFMessage", [start], [_static(body, start)], latched=True)
+    fixed = np.array([[[*place[:3, 3], *quaternion(place)] for _, _, place in body.links]])
+    pairs = [(parent, child) for parent, child, _ in body.links]
+    static = replace(transforms("/tf_static", nanoseconds(start), pairs, fixed), latched=True)
     latched: dict[str, tuple[str, Any]] = {
         "/robot_description": ("std_msgs/msg/String", _text(body.text)),
         "/obstacles": ("visualization_msgs/msg/MarkerArray", _markers(_standing(rollout))),
@@ -42,28 +45,6 @@ def _message(name: str, kind: str, times: Sequence[float], contents: Iterable[An
     types = message_types()
     payloads = [types.serialize_cdr(content, kind) for content in contents]
     return Topic(name, kind, nanoseconds(times), payloads, latched)
-
-
-def _static(body: RobotFrames, start: float) -> Any:
-    """Return the static transforms."""
-    return _of(
-        "tf2_msgs/msg/TFMessage",
-        transforms=[
-            _of(
-                "geometry_msgs/msg/TransformStamped",
-                header=_header(parent, start),
-                child_frame_id=child,
-                transform=_of(
-                    "geometry_msgs/msg/Transform",
-                    translation=_of(
-                        "geometry_msgs/msg/Vector3", **dict(zip("xyz", place[:3, 3].tolist(), strict=True))
-                    ),
-                    rotation=_of("geometry_msgs/msg/Quaternion", **dict(zip("xyzw", quaternion(place), strict=True))),
-                ),
-            )
-            for parent, child, place in body.links
-        ],
-    )
 
 
 def _maps(rollout: Rollout) -> list[Topic]:
@@ -120,12 +101,11 @@ def _standing(rollout: Rollout) -> list[Any]:
     """Return markers of cylinders, walls and goal."""
     scene, frame, at = Scene.of(rollout), rollout.record.task.frame, float(rollout.t[0])
     centres = world_to_map(frame, scene.obstacles[:, :2]).tolist()
-    markers = [
-        _marker(at, MAP, "unseen" if unseen else "cylinders", i, CYLINDER, UNSEEN if unseen else KNOWN, (x, y), size)
-        for i, ((x, y), size, unseen) in enumerate(
-            zip(centres, _sizes(scene.obstacles[:, 2:]), scene.unseen.tolist(), strict=True)
-        )
-    ]
+    markers = []
+    for i, (centre, unseen) in enumerate(zip(centres, scene.unseen.tolist(), strict=True)):
+        radius, height = scene.obstacles[i, 2:].tolist()
+        group, colour = ("unseen", UNSEEN) if unseen else ("cylinders", KNOWN)
+        markers.append(_marker(at, MAP, group, i, CYLINDER, colour, centre, (2 * radius, 2 * radius, height)))
     goal = world_to_map(frame, [scene.goal])[0].tolist()
     width = 2 * scene.goal_tolerance
     markers.append(_marker(at, MAP, "goal", 0, CYLINDER, GOAL, goal, (width, width, FLAT)))
@@ -214,10 +194,6 @@ def _marker(
 
 def _markers(markers: list[Any]) -> Any:
     return _of("visualization_msgs/msg/MarkerArray", markers=markers)
-
-
-def _sizes(radii_and_heights: Floats) -> list[tuple[float, float, float]]:
-    return [(2 * radius, 2 * radius, height) for radius, height in radii_and_heights.tolist()]
 
 
 def _of(kind: str, **values: Any) -> Any:
