@@ -154,25 +154,9 @@ def shown(value: Any, longest: int = LONGEST) -> str:
 SIGNIFICANT = 6  # significant digits of numbers in a page
 
 
-def page_data(
-    columns: Sequence[Mapping[str, Any]],
-    shown: Sequence[str],
-    titles: Mapping[str, str],
-    good: Sequence[bool],
-    planners: Sequence[str],
-    **more: Any,
-) -> str:
-    """Return the runs of a page as JSON for a script element."""
-    data = {
-        "rows": len(good),
-        "planners": list(planners),
-        "columns": columns,
-        "shown": shown,
-        "titles": titles,
-        "good": [int(value) for value in good],
-        **more,
-    }
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+def script_json(value: Any) -> str:
+    """Return JSON for a script element."""
+    text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 

@@ -40,8 +40,8 @@ from antdrive.views.pages.rendering import (
     json_texts,
     link_to,
     measure_title,
-    page_data,
     rendered,
+    script_json,
     shown,
     with_unit,
 )
@@ -394,15 +394,18 @@ def report_data(report: Report, base: str) -> str:
     columns = [json_column(name, table.columns[name]) for name in table.columns if name != "command"]
     commands = {"name": "command", **_commands(table)} if report.summary else None
     kept = [column for column in (*columns, commands) if column is not None]
-    return page_data(
-        kept,
-        report.shown,
-        {column["name"]: report.quantities[column["name"]].heading for column in kept if column["name"] != "command"},
-        [bool(value) for value in table.success],
-        report.planners,
-        sentences=SENTENCES,
-        base=base,
-        sections=bool(report.runs),
+    return script_json(
+        {
+            "rows": len(table),
+            "planners": list(report.planners),
+            "columns": kept,
+            "shown": report.shown,
+            "titles": {name: quantity.heading for name, quantity in report.quantities.items()},
+            "good": [int(value) for value in table.success],
+            "sentences": SENTENCES,
+            "base": base,
+            "sections": bool(report.runs),
+        }
     )
 
 
