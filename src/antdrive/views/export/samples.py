@@ -119,7 +119,7 @@ def scan_topics(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[
     angles = (lidar.angles - heading) if upright else (heading - lidar.angles)[::-1]
     middle = float(angles[0] + angles[-1]) / 2
     first = float(angles[0]) - 2 * math.pi * round(middle / (2 * math.pi))
-    values = {
+    numbers = {
         "angle_min": first,
         "angle_max": first + lidar.spacing * (lidar.beams - 1),
         "angle_increment": lidar.spacing,
@@ -128,8 +128,16 @@ def scan_topics(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[
         "range_min": lidar.min_range,
         "range_max": lidar.max_range,
     }
-    ranges = scans.ranges if upright else scans.ranges[:, ::-1]
-    return [laser_scans("/scan", body.scan, nanoseconds(rollout.t[scans.rows]), ranges, values)]
+    layout, stamps = CdrLayout(), nanoseconds(rollout.t[scans.rows])
+    _header(layout, body.scan)
+    for name in numbers:
+        layout.number(name, "f4")
+    layout.length(lidar.beams)
+    layout.number("ranges", "f4", lidar.beams)
+    layout.length(0)
+    values: dict[str, Any] = {name: np.full(len(stamps), number) for name, number in numbers.items()}
+    values["ranges"] = scans.ranges if upright else scans.ranges[:, ::-1]
+    return [Topic("/scan", "sensor_msgs/msg/LaserScan", stamps, layout.messages(_stamp_values(stamps) | values))]
 
 
 def joint_states(topic: str, stamps: Ints, rollout: Rollout, measured: LoggedOdometry, body: RobotFrames) -> Topic:
@@ -197,23 +205,6 @@ def numbers(topic: str, kind: str, number: str, stamps: Ints, values: Any) -> To
     layout = CdrLayout()
     layout.number("data", number)
     return Topic(topic, kind, stamps, layout.messages({"data": values}))
-
-
-def laser_scans(
-    topic: str, frame: str, stamps: Ints, ranges: npt.NDArray[np.floating], values: dict[str, float]
-) -> Topic:
-    """Return scans of a planar lidar."""
-    layout = CdrLayout()
-    _header(layout, frame)
-    for name in values:
-        layout.number(name, "f4")
-    beams = ranges.shape[1]
-    layout.length(beams)
-    layout.number("ranges", "f4", beams)
-    layout.length(0)
-    columns: dict[str, Any] = {name: np.full(len(stamps), value) for name, value in values.items()}
-    payloads = layout.messages(_stamp_values(stamps) | columns | {"ranges": ranges})
-    return Topic(topic, "sensor_msgs/msg/LaserScan", stamps, payloads)
 
 
 def _header(layout: CdrLayout, frame: str, mark: str = "") -> None:
