@@ -148,12 +148,6 @@ def test_too_few_worlds_for_so_many_pairs_are_said(planners, too_few, need, pair
     assert "" not in {row.better for row in enough.comparisons["duration_s"]}
 
 
-def test_the_least_p_value_is_holms_product():
-    for planners, worlds in (("ABC", 6), ("ABC", 7)):
-        rows = table_of(planners, worlds).comparisons["duration_s"]
-        assert [row.p_worlds_holm for row in rows] == pytest.approx([3 * 2 ** (1 - worlds)] * 3)
-
-
 def test_outcomes_are_counted_by_planner(summary):
     table = outcome_cells(summary)
     assert table.headings == ("planner", "succeeded", "collided", "runs")
