@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+from antdrive.base.errors import amount
 from antdrive.runs.statistics.comparison import ALPHA, SUCCESS, PairedComparison
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.views.pages.rendering import Quantity, percent, percents, probability
@@ -49,8 +50,8 @@ def _sentence(paired: PairedRuns, row: PairedComparison, tested: int) -> str:
         for test, p in zip(tests, (row.p_holm, row.p_worlds_holm), strict=True)
         if not math.isnan(p)
     ]
-    over = f"n = {_counted(row.pairs, 'pair')} in {_counted(row.worlds, 'world')}"
-    return f"{_effect(paired, row, over)}; {', '.join(found)} (Holm, {_counted(tested, 'pair')})."
+    over = f"n = {amount(row.pairs, 'pair')} in {amount(row.worlds, 'world')}"
+    return f"{_effect(paired, row, over)}; {', '.join(found)} (Holm, {amount(tested, 'pair')})."
 
 
 def _effect(paired: PairedRuns, row: PairedComparison, over: str) -> str:
@@ -93,7 +94,3 @@ def _disagreement(row: PairedComparison, tested: int) -> str:
 def _equals(p: float) -> str:
     text = probability(p)
     return text if text.startswith("<") else f"= {text}"
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
