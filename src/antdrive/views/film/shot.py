@@ -41,10 +41,9 @@ class Shot:
         self.outcome = rollout.outcome
         self._follows = self.options.camera == "follow"
         self._tracks_movers = not planning and len(rollout.tracks) > 0
-        self._own_map = (
-            OwnMapPainter(rollout, scene) if not planning and not scene.mapped and len(rollout.scans) else None
-        )
-        self._fan = self._own_map or (BeamPainter(rollout) if not planning and len(rollout.scans) else None)
+        scans = not planning and len(rollout.scans) > 0
+        self._own_map = OwnMapPainter(rollout, scene) if scans and not scene.mapped else None
+        self._fan = self._own_map or (BeamPainter(rollout) if scans else None)
         replans = not planning and any(event.caption for event in self.playback.replans)
         legend = self._lay_out(rollout, planning=planning, replans=replans, bare=bare)
         planner = rollout.record.planner.name
