@@ -157,7 +157,7 @@ def cache_folder() -> Path | None:
     given = os.environ.get("NUMBA_CACHE_DIR")
     for folder in (*([Path(given)] if given else []), *default_folders()):
         new = not os.path.exists(folder)
-        if _writable(folder):
+        if writable(folder):
             if new:
                 with contextlib.suppress(OSError):
                     (folder / ".gitignore").write_text("*\n")
@@ -167,11 +167,16 @@ def cache_folder() -> Path | None:
 
 def default_folders() -> tuple[Path, Path]:
     """Return the folders that numba itself tries for antdrive's kernels."""
-    user = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
-    return _ROOT / "base" / "__pycache__", user / "numba"
+    return _ROOT / "base" / "__pycache__", user_cache() / "numba"
 
 
-def _writable(folder: Path) -> bool:
+def user_cache() -> Path:
+    """Return the user's cache folder."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
+
+
+def writable(folder: Path) -> bool:
+    """Return whether files can be written into a folder, made if it is missing."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -191,7 +196,7 @@ def _private_folder() -> Path | None:
         folder.mkdir(mode=0o700, exist_ok=True)
         found = folder.lstat()
         private = user is None or (found.st_uid == user and not found.st_mode & 0o077)
-        if stat.S_ISDIR(found.st_mode) and private and _writable(folder):
+        if stat.S_ISDIR(found.st_mode) and private and writable(folder):
             return folder
         return Path(tempfile.mkdtemp(prefix="antdrive-cache-"))
     except OSError:  # includes a missing folder for temporary files

@@ -20,7 +20,8 @@ from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.success import StepCurve, distributions, performance_profiles
 from antdrive.views.colours import INK, MUTED, LabelStyle, hexed
 from antdrive.views.figures.canvas import PRINTED, new_figure, save_figure, styled
-from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics, measure_title
+from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics
+from antdrive.views.pages.rendering import Quantity, measure_title
 
 WORST = 10_000.0  # right end of a profile, as a multiple of the best value
 WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]
@@ -29,7 +30,6 @@ FEWEST = 3  # values per box
 MOST_PANELS = 24  # planners with box plots
 MOST_DOTS = 60  # outliers per box
 BINS = 4  # groups of world sizes
-CURVE_POINTS = 400  # per curve, at most
 PROFILED = ("driven_length_m", "plan_s")
 DISTRIBUTED = ("duration_s", "plan_s")
 BOXED = ("plan_s", "gap_to_grid_optimum")
@@ -114,8 +114,8 @@ def _steps(
 ) -> None:
     for k, (curve, style) in enumerate(zip(curves, styles, strict=True)):
         inside = curve.x <= high
-        x, share = _thinned(curve.x[inside], curve.fraction[inside], low, high, log)
-        x = np.concatenate([[low], x, [high]])
+        share = curve.fraction[inside]
+        x = np.concatenate([[low], curve.x[inside], [high]])
         share = np.concatenate([[0.0], share, share[-1:] if len(share) else [0.0]])
         (line,) = axes.step(x, share, where="post", color=style.light, ls=style.dash, lw=1.6)
         line.set_gid(f"planner-{k}")
@@ -133,16 +133,6 @@ def _steps(
 def _write_identical(axes: Any, words: str) -> None:
     size = 0.9 * matplotlib.rcParams["font.size"]
     axes.text(0.5, 0.97, words, ha="center", va="top", transform=axes.transAxes, fontsize=size)
-
-
-def _thinned(x: Floats, share: Floats, low: float, high: float, log: bool) -> tuple[Floats, Floats]:
-    """Thin a curve to at most `CURVE_POINTS` steps, keeping the last step per pixel."""
-    if len(x) <= CURVE_POINTS:
-        return x, share
-    place = (np.log(x / low) / np.log(high / low)) if log else (x - low) / (high - low)
-    pixel = np.floor(CURVE_POINTS * place)
-    last = np.append(np.diff(pixel) > 0, True)
-    return x[last], share[last]
 
 
 def _size_boxes(paired: PairedRuns, name: str, common: Flags, styles: Sequence[LabelStyle]) -> list[Chart]:
@@ -332,7 +322,7 @@ def _svg(figure: Figure, styles: Sequence[LabelStyle]) -> str:
 
 
 def _plain(name: str) -> str:
-    return measure_title(name).partition(" [")[0]
+    return Quantity.of(name).title
 
 
 def _round(value: float) -> str:

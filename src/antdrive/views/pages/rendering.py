@@ -6,7 +6,7 @@ import functools
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,6 +15,7 @@ from urllib.parse import quote
 from antdrive.base.files import relative
 from antdrive.base.version import __version__
 from antdrive.runs.statistics.intervals import Interval
+from antdrive.sim.facts import FACTS, Fact
 
 if TYPE_CHECKING:
     import jinja2
@@ -48,20 +49,74 @@ def percents(interval: Interval) -> str:
     return NONE if math.isnan(interval.low) else f"{percent(interval.low)} to {percent(interval.high)}"
 
 
+TITLES = {
+    "plan_s": "planning time",
+    "drive_wall_s": "wall time of the drive",
+    "path_length_m": "planned length",
+    "bound_m": "certified clearance",
+}
+UNITS = ("_rad_per_m", "_m2", "_m", "_s", "_hz")  # suffixes of names
+FRACTIONS = ("gap_to_grid_optimum", "gap_to_euclidean_optimum")  # shown in percent
+
+
+class Quantity(NamedTuple):
+    """How pages show the values of a column."""
+
+    title: str
+    unit: str  # empty without one
+    factor: float  # from the column's own unit
+
+    @classmethod
+    def of(cls, name: str, values: Iterable[Any] = ()) -> Quantity:
+        """Return the quantity of a column: gaps are in percent, wall times in milliseconds if all values are below 1 s."""
+        fact = _fact_of(name)
+        unit = "" if fact is None or fact.unit == "1" else fact.unit
+        plain = next((name.removesuffix(suffix) for suffix in UNITS if unit and name.endswith(suffix)), name)
+        title = TITLES.get(name, plain.removeprefix("option.").replace("_", " "))
+        if name in FRACTIONS:
+            return cls(title, "%", 100.0)
+        sizes = [abs(size) for value in values if (size := number(value))] if fact and fact.proof == "clock" else []
+        return cls(title, "ms", 1000.0) if sizes and max(sizes) < 1 else cls(title, unit, 1.0)
+
+    @property
+    def heading(self) -> str:
+        """Title with unit."""
+        return f"{self.title} [{self.unit}]" if self.unit else self.title
+
+    def text(self, value: float) -> str:
+        """Format a value without its unit."""
+        return short(self.factor * value)
+
+
+def measure_title(name: str, values: Iterable[Any] = ()) -> str:
+    """Return a column's heading with the unit that fits its values."""
+    return Quantity.of(name, values).heading
+
+
+def _fact_of(name: str) -> Fact | None:
+    """Return the fact that a column or a setting holds; a setting's name has no unit."""
+    return next((FACTS[known] for known in (name, f"{name}_m", f"{name}_s") if known in FACTS), None)
+
+
+def with_unit(name: str, value: Any) -> tuple[str, str]:
+    """Return the title of a fact and its value with the unit; another name and value as they are."""
+    quantity, known = Quantity.of(name, [value]), number(value)
+    if _fact_of(name) is None:
+        return name, shown(value)
+    if known is None:
+        return quantity.title, shown(value)
+    return quantity.title, f"{shown(round(quantity.factor * known, 6) + 0.0)} {quantity.unit}".rstrip()
+
+
 def short(value: float) -> str:
     """Format a number with three significant digits."""
     if not math.isfinite(value):
         return NONE if math.isnan(value) else "∞"
     if value == 0:
         return "0"
-    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    digits = max(0, 2 - math.floor(math.log10(abs(float(f"{value:.2e}")))))
     text = f"{value:.{min(digits, 6)}f}"
     return "0" if float(text) == 0 else text
-
-
-def with_interval(value: float, interval: Interval) -> str:
-    """Format a number with its interval in brackets."""
-    return f"{short(value)} ({short(interval.low)} to {short(interval.high)})"
 
 
 def probability(p: float) -> str:
@@ -99,25 +154,9 @@ def shown(value: Any, longest: int = LONGEST) -> str:
 SIGNIFICANT = 6  # significant digits of numbers in a page
 
 
-def page_data(
-    columns: Sequence[Mapping[str, Any]],
-    shown: Sequence[str],
-    titles: Mapping[str, str],
-    good: Sequence[bool],
-    planners: Sequence[str],
-    **more: Any,
-) -> str:
-    """Return the runs of a page as JSON for a script element."""
-    data = {
-        "rows": len(good),
-        "planners": list(planners),
-        "columns": columns,
-        "shown": shown,
-        "titles": titles,
-        "good": [int(value) for value in good],
-        **more,
-    }
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+def script_json(value: Any) -> str:
+    """Return JSON for a script element."""
+    text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
@@ -126,7 +165,12 @@ def json_column(name: str, values: Sequence[Any]) -> dict[str, Any] | None:
     if all(value is None for value in values):
         return None
     if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
-        return {"name": name, "numbers": [_number(value) for value in values]}
+        factor = Quantity.of(name, values).factor
+        return {
+            "name": name,
+            "numbers": [_number(value) for value in values],
+            **({} if factor == 1 else {"factor": factor}),
+        }
     return {"name": name, **json_texts([None if value is None else str(value) for value in values])}
 
 
