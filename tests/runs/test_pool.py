@@ -17,7 +17,7 @@ from antdrive.runs import pool
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.running import finished_of
-from antdrive.runs.pool import CHUNK_SECONDS, LONGEST_CHUNK, Pool, Waiting, WorkerDied, call_now, processes_for
+from antdrive.runs.pool import Pool, Waiting, WorkerDied, call_now, processes_for
 from tests.runs.campaigns.works import Deadly, Endless, Listing
 from tests.runs.light_works import Unloadable, compiling, dies_once, fails, process, refuses
 
@@ -141,59 +141,27 @@ def test_one_process_is_this_one_and_so_are_those_of_a_worker():
         assert list(workers.results(processes_for, [3, 3])) == [0, 0]
 
 
-Run = tuple[str, int]  # the world, the seed
-
-
-def queue(runs, processes):
-    return Waiting(runs, processes, lambda run: run[0])
-
-
 @given(
     st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 5)), unique=True, max_size=18),
-    st.integers(1, 4),
-    st.lists(st.tuples(st.sampled_from([None, *"abc"]), st.floats(1e-4, 10), st.booleans()), max_size=40),
+    st.lists(st.tuples(st.sampled_from([None, *"abc"]), st.booleans()), max_size=40),
 )
-def test_every_run_is_handed_out_once_whatever_is_asked_measured_and_put_back(runs, processes, asked):
-    waiting, made = queue(runs, processes), Counter[Run]()
-    left = len(runs)
-    for world, seconds, back in [*asked, *[(None, 1e-3, False)] * len(runs)]:
-        assert len(waiting) == left
-        chunk = waiting.chunk(world)
-        assert bool(chunk) == bool(left)
-        if back:
-            waiting.put_back(chunk)
-            continue
-        made.update(one.item for one in chunk)
-        left -= len(chunk)
-        if chunk:
-            waiting.measured(seconds * len(chunk), len(chunk))
-    assert made == Counter(runs)
-
-
-def test_chunks_take_two_seconds_and_shrink_at_the_end():
-    waiting = queue((("a", seed) for seed in range(1000)), 2)
-    assert len(waiting.chunk(None)) == 1, "nothing is measured yet"
-    waiting.measured(0.1)
-    assert len(waiting.chunk(None)) == CHUNK_SECONDS / 0.1
-    waiting.measured(1e-5, runs=1000)
-    assert len(waiting.chunk(None)) == min(LONGEST_CHUNK, -(-979 // 4))
-    while len(waiting) > 4:
-        waiting.chunk(None)
-    assert len(waiting.chunk(None)) == 1
-
-
-def test_runs_that_are_put_back_come_one_by_one_before_all_others():
-    waiting = queue((("a", seed) for seed in range(9)), 1)
-    waiting.measured(1e-3)
-    first = waiting.chunk(None)
-    waiting.put_back(first)
-    assert [waiting.chunk(None) for _ in first] == [[one] for one in first]
+def test_every_run_is_handed_out_once_whatever_is_asked_and_put_back(runs, asked):
+    waiting, made = Waiting(runs, lambda run: run[0]), []
+    for world, back in [*asked, *[(None, False)] * len(runs)]:
+        assert len(waiting) == len(runs) - len(made)
+        if waiting and back:
+            ticket = waiting.take(world)
+            waiting.put_back(ticket)
+            assert waiting.take(ticket.group) is ticket, "first of its group"
+            waiting.put_back(ticket)
+        elif waiting:
+            made.append(waiting.take(world).item)
+    assert sorted(made) == sorted(runs)
 
 
 def test_a_process_goes_on_with_its_world_then_takes_a_fresh_one_then_helps():
-    runs = [*(("a", seed) for seed in range(40)), ("b", 0), ("c", 0)]
-    waiting = queue(runs, 40)
-    worlds = [waiting.chunk(world)[0].group for world in (None, "a", None, "b", "b")]
+    waiting = Waiting([*(("a", seed) for seed in range(40)), ("b", 0), ("c", 0)], lambda run: run[0])
+    worlds = [waiting.take(world).group for world in (None, "a", None, "b", "b")]
     assert worlds == ["a", "a", "b", "c", "a"]
 
 

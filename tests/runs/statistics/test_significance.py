@@ -113,13 +113,6 @@ def test_holm_by_hand():
     assert holm(np.array([np.nan, 0.04]))[1] == pytest.approx(0.04)
 
 
-def test_holm_is_that_of_statsmodels():
-    from statsmodels.stats.multitest import multipletests  # collects garbage at every call, so that it is called once
-
-    p_values = np.random.default_rng(8).random(40).round(1) ** 4  # with ties, zeros and ones
-    assert holm(p_values) == pytest.approx(multipletests(p_values, method="holm")[1])
-
-
 def drawn(world, resamples=200):
     return np.concatenate(list(resampled(world, resamples)))
 
