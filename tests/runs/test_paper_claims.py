@@ -496,7 +496,10 @@ def test_the_arms_of_a_group_are_kept_in_one_file_and_run_again_together(tmp_pat
     monkeypatch.setattr(reproduction, "PAPERS", {"hasan": lambda: [arms[0], alone, arms[1]]})
     first = reproduction.reproduce(["hasan"], tmp_path, seeds=3)
     assert [(e.name, len(runs)) for e, runs in first.measured] == [("dstar", 3), ("alone", 3), ("mmas-dstar", 3)]
-    assert sorted(path.name for path in (tmp_path / "trials").iterdir()) == ["hasan-m-alone.npz", "hasan-m-g.npz"]
+    assert sorted(path.name for path in (tmp_path / "trials").iterdir()) == [
+        "hasan-m-alone.json.gz",
+        "hasan-m-g.json.gz",
+    ]
     again = reproduction.reproduce(["hasan"], tmp_path, seeds=3)
     assert again.kept == 3
     works = [solve(e.planner, {}, query, 0).work for e, _ in first.measured]
@@ -520,7 +523,7 @@ def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
         ("astar", {}, shut),
     ]
     made = [solve(planner, options, query, 3) for planner, options, query in cases]
-    path, key = tmp_path / "t.npz", runs_key(one, 4)
+    path, key = tmp_path / "t.json.gz", runs_key(one, 4)
     save_runs(made, path, key)
     read = load_runs(path, key)
     quantities = (
@@ -537,7 +540,7 @@ def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
         assert load_runs(path, runs_key(dataclasses.replace(one, **changed), 4)) is None
     path.write_bytes(path.read_bytes()[:-200])
     assert load_runs(path, key) is None
-    assert load_runs(tmp_path / "none.npz", key) is None
+    assert load_runs(tmp_path / "none.json.gz", key) is None
 
 
 def test_a_length_that_no_map_has_is_refused(monkeypatch):

@@ -262,16 +262,19 @@ def test_words_select_tests(tmp_path):
         tmp_path / "below", "schema: 1\ndefaults: {world: empty, seeds: 0-1}\nscenarios: {a: {}, ab: {}, c: {}}\n"
     )
 
+    wrong = suite(tmp_path, "schema: 1\nscenarios: {a: {world: empty, controller: {brake: 1}}}\n", "wrong.drive.yaml")
+
     def ids(*words, pattern=None):
         return [case.id for case in select(words, pattern)]
 
-    assert ids(str(tmp_path)) == ["a[0]", "a[1]", "ab[0]", "ab[1]", "c[0]", "c[1]"]
+    assert ids(str(path.parent)) == ["a[0]", "a[1]", "ab[0]", "ab[1]", "c[0]", "c[1]"]
     assert ids(f"{path}::a") == ["a[0]", "a[1]"]
     assert ids(f"{path}::c[1]", str(path), pattern="c") == ["c[1]", "c[0]"]
     assert ids(str(path), pattern="a*") == ["a[0]", "a[1]", "ab[0]", "ab[1]"]
     for words, pattern, message in (
         ([f"{path}::d"], None, "no test 'd'; choose from"),
         ([str(path)], "x*", "no test of"),
+        ([str(wrong)], None, "scenarios.a.controller.brake: unknown setting; did you mean braking"),
         ([str(tmp_path / "none.drive.yaml")], None, "no such file"),
         ([__file__], None, "not a suite; its name must end in .drive.yaml"),
         ([str(Path(__file__).parent)], None, "contains no suites"),

@@ -348,6 +348,8 @@ class _CommandData(Document):
     def error(self, location: Location, problem: str) -> InputError:
         key = next((step for step in location if isinstance(step, str) and step != "settings"), None)
         option = self.options.get(key) if key else None
+        if option and key == "planners" and isinstance(location[-1], str) and location[-1] not in ("planners", "name"):
+            option = f"--set planner.{location[-1]}"
         return InputError(f"{option}: {problem}") if option else super().error(location, problem)
 
 
