@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 import time
-from collections import Counter
+from collections import Counter, deque
 from types import SimpleNamespace
 
 import pytest
@@ -15,7 +15,7 @@ from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.running import finished_of, log_path
 from antdrive.runs.campaigns.sweeping import sweep
 from antdrive.runs.cluster import _received, run_on_cluster
-from antdrive.runs.pool import Ticket, Waiting
+from antdrive.runs.pool import Ticket
 from tests.runs.campaigns.works import Deadly, Endless
 from tests.runs.canonical import canonical_bytes
 
@@ -82,7 +82,7 @@ def test_a_run_that_does_not_end_is_ended():
 def test_a_run_that_finds_no_room_ends_the_campaign():
     failed = SimpleNamespace(status="error", exception=lambda: InputError("No space left on device"))
     with pytest.raises(InputError, match="No space left on device"):
-        list(_received(failed, Ticket(0, None), Waiting([]), slow=False))
+        list(_received(failed, Ticket(0, None), deque(), slow=False))
 
 
 def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(tmp_path, scheduler, monkeypatch):

@@ -10,6 +10,7 @@ import os
 import re
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -17,7 +18,7 @@ from typing import Any
 from antdrive.base import system
 from antdrive.base.errors import input_error
 from antdrive.base.optional import optional
-from antdrive.runs.pool import ATTEMPTS, Done, Item, Result, Ticket, Waiting
+from antdrive.runs.pool import ATTEMPTS, Done, Item, Result, Ticket
 
 RUNS_EACH = 3  # runs per worker, in progress or queued
 PATIENCE = 10.0  # longest absence of the scheduler before the campaign ends [s]
@@ -37,7 +38,8 @@ def run_on_cluster(
     """Run the work for each item on a cluster; yield the results in order of arrival."""
     distributed = optional("distributed", "cluster", "--dask spreads runs over machines")
     with _client(distributed, address) as client:
-        waiting, at_work, workers, counted = Waiting(items), dict[Any, Ticket[Item]](), 1, -math.inf
+        waiting = deque(Ticket(number, item) for number, item in enumerate(items))
+        at_work, workers, counted = dict[Any, Ticket[Item]](), 1, -math.inf
 
         def submit(ticket: Ticket[Item]) -> None:
             # dask searches arguments for results of other tasks, which is slow; it does not search a partial's arguments.
@@ -50,7 +52,7 @@ def run_on_cluster(
             if time.monotonic() - counted > WORKERS_EVERY:
                 workers, counted = _workers(client, address), time.monotonic()
             while waiting and len(at_work) < RUNS_EACH * workers:
-                submit(waiting.take())
+                submit(waiting.popleft())
             # Any run queued at a dead worker may have killed it, so each is retried alone.
             if not at_work:
                 tried, since = suspects.pop(), time.monotonic()
@@ -91,20 +93,20 @@ def _ended_after(limit: float | None) -> Iterator[None]:
         timer.cancel()
 
 
-def _received(future: Any, ticket: Ticket[Item], waiting: Waiting[Item], slow: bool) -> Iterator[Done[Item, Any]]:
+def _received(future: Any, ticket: Ticket[Item], waiting: deque[Ticket[Item]], slow: bool) -> Iterator[Done[Item, Any]]:
     """Yield the result of a run. One that killed its workers while alone may have been too slow."""
     if future.status == "finished":
         try:
             yield Done(ticket.item, ticket.number, future.result())
         except OSError:  # the connection was lost before the result came
-            waiting.put_back(ticket)
+            waiting.appendleft(ticket)
     elif _killed(future):
         died = "its worker processes died"
         yield Done(ticket.item, ticket.number, died=died, slow=slow, attempts=ATTEMPTS)
     elif future.status == "error":
         raise future.exception()
     else:  # cancelled: the connection was lost temporarily
-        waiting.put_back(ticket)
+        waiting.appendleft(ticket)
 
 
 def _killed(future: Any) -> bool:

@@ -14,7 +14,7 @@ import signal
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, NoReturn, TypeVar
@@ -37,49 +37,7 @@ class Ticket(Generic[Item]):
 
     number: int
     item: Item
-    group: Hashable = None
     attempts: int = 0
-
-
-class Waiting(Generic[Item]):
-    """Queue of runs, by group.
-
-    A process stays with the group of its last run, then takes an untouched group, then helps with the largest.
-    """
-
-    def __init__(self, items: Iterable[Item], group: Callable[[Item], Hashable] = lambda item: None) -> None:
-        self._groups: dict[Hashable, deque[Ticket[Item]]] = {}
-        self._length = 0
-        for number, item in enumerate(items):
-            self.put_back(Ticket(number, item, group(item)), first=False)
-        self._fresh = deque(self._groups)
-
-    def __len__(self) -> int:
-        return self._length
-
-    def put_back(self, ticket: Ticket[Item], *, first: bool = True) -> None:
-        """Return a run to its group, before or after the others."""
-        runs = self._groups.setdefault(ticket.group, deque())
-        (runs.appendleft if first else runs.append)(ticket)
-        self._length += 1
-
-    def take(self, group: Hashable = None) -> Ticket[Item]:
-        """Take the next run for a process whose last run was of a group."""
-        runs = self._groups[group := self._next_group(group)]
-        ticket = runs.popleft()
-        self._length -= 1
-        if not runs:
-            del self._groups[group]
-        return ticket
-
-    def _next_group(self, last: Hashable) -> Hashable:
-        if last in self._groups:
-            return last
-        while self._fresh:
-            group = self._fresh.popleft()
-            if group in self._groups:
-                return group
-        return max(self._groups, key=lambda group: len(self._groups[group]))
 
 
 class WorkerDied(RuntimeError):
@@ -130,7 +88,6 @@ class _Worker:
     work: Callable[[Any], Any]
     ready: bool = False
     ticket: Ticket[Any] | None = None  # the current run
-    group: Hashable = None  # of the last run
     since: float = 0.0  # start of the current run
     slow: bool = False  # whether it was killed because that run exceeded the limit
     fault: str = ""  # what user code did to the process
@@ -176,19 +133,13 @@ class Pool:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def each(
-        self,
-        work: Callable[[Item], Result],
-        items: Iterable[Item],
-        *,
-        group: Callable[[Item], Hashable] = lambda item: None,
-    ) -> Generator[Done[Item, Result], None, None]:
-        """Run the work for each item; yield results in order of arrival. Workers keep to a group of items while they can."""
+    def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Generator[Done[Item, Result], None, None]:
+        """Run the work for each item; yield results in order of arrival."""
         if not self._processes:
             for number, item in enumerate(items):
                 yield Done(item, number, work(item))
             return
-        waiting = Waiting(items, group)
+        waiting = deque(Ticket(number, item) for number, item in enumerate(items))
         stillborn = 0
         try:
             while waiting or any(worker.ticket for worker in self._workers):
@@ -256,11 +207,11 @@ class Pool:
                     system.kill(process.pid)  # loky's processes have no `kill`
                 process.join()
 
-    def _staff(self, work: Callable[[Any], Any], waiting: Waiting[Any]) -> None:
+    def _staff(self, work: Callable[[Any], Any], waiting: deque[Ticket[Any]]) -> None:
         """Hand runs to idle workers and start missing ones."""
         for worker in self._workers:
             if worker.ready and worker.ticket is None and waiting:
-                _hand(worker, work, waiting.take(worker.group))
+                _hand(worker, work, waiting.popleft())
         idle = sum(worker.ticket is None for worker in self._workers)
         for _ in range(min(len(waiting) - idle, self._processes - len(self._workers))):
             self._workers.append(_start(work))
@@ -282,7 +233,7 @@ class Pool:
                 with contextlib.suppress(OSError):
                     system.kill(worker.process.pid)
 
-    def _reap(self, worker: _Worker, waiting: Waiting[Any]) -> Iterator[Done[Any, Any]]:
+    def _reap(self, worker: _Worker, waiting: deque[Ticket[Any]]) -> Iterator[Done[Any, Any]]:
         """Return a dead worker's run to the queue, or yield it if that was the last attempt."""
         self._workers.remove(worker)
         worker.pipe.close()
@@ -296,7 +247,7 @@ class Pool:
             tries, fault = ticket.attempts, bool(worker.fault)
             yield Done(ticket.item, ticket.number, died=died, slow=worker.slow, fault=fault, attempts=tries)
         else:
-            waiting.put_back(ticket)
+            waiting.appendleft(ticket)
 
 
 def call_now(call: Callable[[], Result]) -> Result:
@@ -313,7 +264,7 @@ def in_new_process(call: Callable[[], Result]) -> Result | None:
 
 def _take_result(worker: _Worker, ticket: Ticket[Any], result: Any) -> Done[Any, Any]:
     """Return the result of a worker's run; the worker is idle."""
-    worker.group, worker.ticket, worker.slow = ticket.group, None, False
+    worker.ticket, worker.slow = None, False
     return Done(ticket.item, ticket.number, result, attempts=ticket.attempts + 1)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-import os
 import shlex
 import tempfile
 import time
@@ -22,7 +21,7 @@ from antdrive.runs.suites.baseline import Baseline, fixed_hashes
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.evaluation import RAISED, Evaluation, changes, evaluate, explain, unmet_demands
 from antdrive.runs.suites.scenarios import run_command, scenario_of
-from antdrive.runs.suites.suite import SuiteCase, load_suite, shown_path
+from antdrive.runs.suites.suite import SuiteCase, shown_path
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
 from antdrive.sim.rerun import UNSTEADY, fingerprint, fingerprint_of, is_unsteady
@@ -246,7 +245,7 @@ def _check_of(case: SuiteCase, update: Update, results: Results | None) -> Check
         update=update,
         folder=results.of(case.suite, case.id) if results else None,
         results=results,
-        again=functools.partial(_fingerprint_by_name, str(case.suite), case.id),
+        again=functools.partial(_fingerprint_of, case),
     )
 
 
@@ -310,34 +309,18 @@ def _check_in_turn(
         for case in cases:
             yield _check_or_fail(case, update, results)
         return
-    work = functools.partial(_check_by_name, str(Path.cwd()), update, results)
+    work = functools.partial(_check_or_fail, update=update, results=results)
     with Pool(jobs) as pool:
-        made = pool.in_order(work, [(str(case.suite), case.id) for case in cases])
-        for case, done in zip(cases, made, strict=True):
+        for case, done in zip(cases, pool.in_order(work, cases), strict=True):
             if done.fault:
                 yield _check_of(case, update, results).failed_early(RAISED, done.died, WorkerDied(done.died))
             elif done.died:
                 fault = f"internal error: {done.died}"
                 yield _check_of(case, update, results).failed_early(INTERNAL_ERROR, fault, WorkerDied(done.died))
-            elif isinstance(done.value, str):  # the suite changed after loading
-                yield _check_of(case, update, results).failed_early(INVALID_INPUT, done.value, InputError(done.value))
             else:
                 yield done.value
 
 
-def _fingerprint_by_name(suite: str, test: str) -> str:
+def _fingerprint_of(case: SuiteCase) -> str:
     """Return the fingerprint of a test's scenario."""
-    return fingerprint(next(scenario_of(case) for case in load_suite(suite) if case.id == test))
-
-
-def _check_by_name(folder: str, update: Update, results: Results | None, name: tuple[str, str]) -> CheckResult | str:
-    """Return the result of a test named by another process, or an error message if the test was removed."""
-    os.chdir(folder)
-    suite, test = name
-    try:
-        case = next((case for case in load_suite(suite) if case.id == test), None)
-    except InputError as error:
-        return str(error)
-    if case is None:
-        return f"{suite}: test {test} was removed during the run"
-    return _check_or_fail(case, update, results)
+    return fingerprint(scenario_of(case))

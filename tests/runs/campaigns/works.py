@@ -29,19 +29,6 @@ class Deadly:
 
 
 @dataclass(frozen=True)
-class Listing:
-    """Every run adds a line to a file: the world that its process is in."""
-
-    path: str
-
-    def __call__(self, job):
-        time.sleep(0.01)
-        with Path(self.path).open("a") as stream:
-            stream.write(f"{os.getpid()} {job.case.place.world}\n")
-        return Finished(failed_row(job.key, "succeeded", ""))
-
-
-@dataclass(frozen=True)
 class Endless:
     """A run whose seed is among `seeds` does not end."""
 

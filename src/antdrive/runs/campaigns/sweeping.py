@@ -209,7 +209,7 @@ def _runs(
             yield runs
     else:
         with Pool(cores() if jobs is None else jobs, **watched) as pool:
-            yield pool.each(work, todo, group=lambda job: job.case.place.world)
+            yield pool.each(work, todo)
 
 
 def calibrated(jobs: Iterable[Job]) -> list[Job]:

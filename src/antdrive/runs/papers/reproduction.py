@@ -203,17 +203,17 @@ def reproduce(
     return Reproduction(measured, rows, verdicts, claims, files, kept)
 
 
-Settings = Mapping[str, Mapping[str, Mapping[str, Mapping[str, str]]]]  # by paper, arm and map
+ArmFacts = Mapping[str, Mapping[str, Mapping[str, Mapping[str, str]]]]  # by paper, arm and map
 
 
-def _settings(experiments: Sequence[Experiment]) -> Settings:
+def _settings(experiments: Sequence[Experiment]) -> ArmFacts:
     settings: dict[str, dict[str, dict[str, dict[str, str]]]] = {}
     for one in experiments:
         settings.setdefault(one.paper, {}).setdefault(one.name, {})[one.map] = arm_facts(one)
     return settings
 
 
-def _arms_of(claim: Claim, settings: Settings) -> dict[str, dict[str, str]]:
+def _arms_of(claim: Claim, settings: ArmFacts) -> dict[str, dict[str, str]]:
     """Return the settings of a claim's arms on its maps, by the arms' names."""
     maps: dict[str, list[str]] = {}
     for case in claim.cases:
