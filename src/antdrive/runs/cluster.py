@@ -114,7 +114,7 @@ def _killed(future: Any) -> bool:
     return future.status == "error" and type(future.exception()).__name__ == "KilledWorker"
 
 
-def check_address(address: str) -> None:
+def validate_address(address: str) -> None:
     """Raise `InputError` unless a text is an address of a cluster."""
     if not _LOCAL.fullmatch(address) and not re.match(r"(tcp|tls|ucx|ws|wss)://.", address):
         raise input_error(
@@ -125,7 +125,7 @@ def check_address(address: str) -> None:
 @contextmanager
 def _client(distributed: Any, address: str) -> Iterator[Any]:
     """Open a client of the cluster at an address."""
-    check_address(address)
+    validate_address(address)
     match = _LOCAL.fullmatch(address)
     with contextlib.ExitStack() as stack:
         target: Any = address

@@ -180,7 +180,11 @@ class Written:
                 load_planner(self.planner, **self.options)
 
     def check_settings(self, at: ErrorAt) -> None:
-        """Check the keys and values of settings; those of the controller load the compiler."""
+        """Check the keys and values of settings; those of the controller load the compiler.
+
+        Args:
+            at: returns the error for a key
+        """
         from antdrive.sim.forms import scenario_fields
 
         with placed(at):

@@ -102,7 +102,7 @@ class CheckResult:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check:
+class Criteria:
     """Criteria for a drive, and the destination of its results."""
 
     address: str  # the test's name in commands
@@ -230,12 +230,12 @@ class Check:
         return files, drove and films == "failed" and not filmed
 
 
-def _check_of(case: SuiteCase, update: Update, results: Results | None) -> Check:
-    """Return the check of a suite's test, with the command that runs only this test."""
+def _criteria_of(case: SuiteCase, update: Update, results: Results | None) -> Criteria:
+    """Return the criteria of a suite's test, with the command that runs only this test."""
     # Commands must work in the working directory; pytest's test names are relative to its rootdir.
     anywhere = results is not None and results.root.resolve() != Path.cwd().resolve()
     address = f"{case.suite}::{case.id}" if anywhere else case.address
-    return Check(
+    return Criteria(
         address=case.address,
         name=case.id,
         demands=case.demands,
@@ -249,7 +249,7 @@ def _check_of(case: SuiteCase, update: Update, results: Results | None) -> Check
     )
 
 
-def check_case(case: SuiteCase, *, update: Update = "", results: Results | None = None) -> CheckResult:
+def evaluate_case(case: SuiteCase, *, update: Update = "", results: Results | None = None) -> CheckResult:
     """Drive a suite's test and evaluate it.
 
     Args:
@@ -260,20 +260,20 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
     Raises:
         InputError: the suite, a file that it names, or the baseline is wrong.
     """
-    scenario, check = scenario_of(case), _check_of(case, update, results)
-    run_alone = run_command(case, anywhere=check.commands != (shlex.join(["antdrive", "check", case.address]),))
-    check = dataclasses.replace(check, commands=tuple(filter(None, (*check.commands, run_alone))))
+    scenario, criteria = scenario_of(case), _criteria_of(case, update, results)
+    run_alone = run_command(case, anywhere=criteria.commands != (shlex.join(["antdrive", "check", case.address]),))
+    criteria = dataclasses.replace(criteria, commands=tuple(filter(None, (*criteria.commands, run_alone))))
     try:
-        return check.evaluate(drive(scenario))
+        return criteria.evaluate(drive(scenario))
     except PlannerError as error:
-        return check.raised(scenario, error)
+        return criteria.raised(scenario, error)
 
 
-def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
+def _evaluate_or_fail(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
     """Return the result of a test; errors become failures, so that a broken test does not stop the others."""
     raised: Exception
     try:
-        return check_case(case, update=update, results=results)
+        return evaluate_case(case, update=update, results=results)
     except FieldError as error:
         outcome, fault, raised = INVALID_INPUT, str(case.error(error.key, error.problem)), error
     except InputError as error:
@@ -281,10 +281,10 @@ def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> 
         outcome, raised = INVALID_INPUT, error
     except Exception as error:  # user planners may raise anything
         outcome, fault, raised = INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}", error
-    return _check_of(case, update, results).failed_early(outcome, fault, raised)
+    return _criteria_of(case, update, results).failed_early(outcome, fault, raised)
 
 
-def check_cases(
+def evaluate_cases(
     cases: Sequence[SuiteCase], *, jobs: int = 1, update: Update = "", results: Results | None = None
 ) -> Iterator[CheckResult]:
     """Drive and evaluate many tests. Yield the results in the order of the tests; they do not depend on `jobs`.
@@ -299,24 +299,24 @@ def check_cases(
     """
     with tempfile.TemporaryDirectory(prefix="antdrive-films-") as places:
         limited = results and dataclasses.replace(results, places=Path(places))
-        yield from _check_in_turn(cases, jobs, update, limited)
+        yield from _evaluate_in_turn(cases, jobs, update, limited)
 
 
-def _check_in_turn(
+def _evaluate_in_turn(
     cases: Sequence[SuiteCase], jobs: int, update: Update, results: Results | None
 ) -> Iterator[CheckResult]:
     if jobs == 1 or len(cases) == 1:
         for case in cases:
-            yield _check_or_fail(case, update, results)
+            yield _evaluate_or_fail(case, update, results)
         return
-    work = functools.partial(_check_or_fail, update=update, results=results)
+    work = functools.partial(_evaluate_or_fail, update=update, results=results)
     with Pool(jobs) as pool:
         for case, done in zip(cases, pool.in_order(work, cases), strict=True):
             if done.fault:
-                yield _check_of(case, update, results).failed_early(RAISED, done.died, WorkerDied(done.died))
+                yield _criteria_of(case, update, results).failed_early(RAISED, done.died, WorkerDied(done.died))
             elif done.died:
                 fault = f"internal error: {done.died}"
-                yield _check_of(case, update, results).failed_early(INTERNAL_ERROR, fault, WorkerDied(done.died))
+                yield _criteria_of(case, update, results).failed_early(INTERNAL_ERROR, fault, WorkerDied(done.died))
             else:
                 yield done.value
 

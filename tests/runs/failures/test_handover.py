@@ -23,7 +23,7 @@ from antdrive.runs.suites.suite import load_suite
 from antdrive.sim import Certificate, Perception, ReplanPolicy, Scenario
 from antdrive.sim.log.record import MarginRecord
 from antdrive.sim.scenario import MarginChoice
-from antdrive.testing.evaluation import check_case
+from antdrive.testing.evaluation import evaluate_case
 from antdrive.worlds import Disc
 
 
@@ -78,13 +78,13 @@ def test_two_robots_of_one_name_have_files_of_their_own(small_run, tmp_path):
 def test_the_suite_holds_as_long_as_the_failure_repeats(collided_run, tmp_path):
     suite = write_suite(tmp_path / "s.drive.yaml", [handed("hit", collided_run, note="as it was")])
     (case,) = load_suite(suite)
-    assert check_case(case).faults == ()
+    assert evaluate_case(case).faults == ()
     assert case.entry.expect == {"outcome": "collided", "touched": "unseen cylinder"}
     mended = yaml.safe_load(suite.read_text())
     del mended["scenarios"]["hit"]["unseen"]
     suite.write_text(yaml.safe_dump(mended))
     (case,) = load_suite(suite)
-    result = check_case(case)
+    result = evaluate_case(case)
     assert result.faults == ("outcome: succeeded, expected collided",), "and nothing about a missing baseline"
 
 

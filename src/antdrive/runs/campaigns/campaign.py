@@ -252,7 +252,7 @@ def load_campaign(path: str | os.PathLike[str]) -> Campaign:
     Raises:
         InputError: the file is missing or invalid.
     """
-    return _checked(read_document(path), Path(path).parent)
+    return _validated(read_document(path), Path(path).parent)
 
 
 def make_campaign(
@@ -273,7 +273,7 @@ def make_campaign(
         InputError: the data is invalid.
     """
     plain = {"schema": 1, **{key: _plain(value) for key, value in data.items()}}
-    return _checked(_CommandData(source, plain, options=options), Path(folder))
+    return _validated(_CommandData(source, plain, options=options), Path(folder))
 
 
 def _plain(value: Any) -> Any:
@@ -287,7 +287,7 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def _checked(document: Document, folder: Path) -> Campaign:
+def _validated(document: Document, folder: Path) -> Campaign:
     for key in SettingsEntry.model_fields.keys() & (document.data if isinstance(document.data, dict) else ()):
         raise document.error((key,), "unknown key; write it under settings")
     entry = check(CampaignFile, document)

@@ -102,7 +102,7 @@ METHODS: Mapping[str, Callable[[Draw], Scenario | None]] = MappingProxyType(
 )
 
 
-def check_method(name: str) -> None:
+def validate_method(name: str) -> None:
     """Raise FieldError unless a search method has this name."""
     if name not in METHODS:
         raise FieldError("method", f"unknown {name!r:.40}; choose from {', '.join(METHODS)}")
@@ -262,7 +262,7 @@ def find_failures(
     Raises:
         FieldError: the method is unknown, or a number of cylinders or runs out of range.
     """
-    check_method(method)
+    validate_method(method)
     if budget < 1:
         raise FieldError("budget", f"must be at least 1, got {budget}")
     if not 1 <= obstacles <= MOST:

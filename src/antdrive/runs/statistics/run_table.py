@@ -178,7 +178,7 @@ def merged(tables: Mapping[str, RunTable]) -> RunTable:
     """
     if len(tables) == 1:
         return next(iter(tables.values()))
-    _check(tables)
+    _validate(tables)
     names = list(dict.fromkeys(name for table in tables.values() for name in table.columns))
     columns = {
         name: [value for table in tables.values() for value in table.columns.get(name, [None] * len(table))]
@@ -193,7 +193,7 @@ def merged(tables: Mapping[str, RunTable]) -> RunTable:
     return RunTable({**columns, FOLDER: folders})
 
 
-def _check(tables: Mapping[str, RunTable]) -> None:
+def _validate(tables: Mapping[str, RunTable]) -> None:
     described = (*PLACE, *CONFIGURATION)
     every = [name for name in described if any(name in table for table in tables.values())]
     for folder, table in tables.items():
