@@ -117,11 +117,6 @@ class StepCurve(NamedTuple):
     x: Floats  # positions of the steps, ascending, (M,)
     fraction: Floats  # value from there on, 0 to 1, (M,)
 
-    def at(self, x: float) -> float:
-        """Return the curve's value."""
-        place = int(np.searchsorted(self.x, x, side="right"))
-        return float(self.fraction[place - 1]) if place else 0.0
-
 
 def performance_profiles(cost: Floats) -> list[StepCurve]:
     """Return for each planner the fraction of instances solved at no more than x times the best cost.
