@@ -82,7 +82,7 @@ def sweep(
 
     if out is None and not dry_run:
         raise InputError("--out: missing; name the output folder")
-    _check(keep, dask, jobs, report, dry_run)
+    _validate(keep, dask, jobs, report, dry_run)
     requested = campaign_from(
         campaign, given, worlds=world, generate=generate, planners=planner, options=settings, robots=robot, seeds=seeds,
         tasks=tasks, run_limit=run_limit,
@@ -110,7 +110,7 @@ def sweep(
     return print_faults(results.faults)
 
 
-def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
+def _validate(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
     """Raise an error about options without effect."""
     if report is not None:
         from antdrive.views.pages.report import SUFFIXES
