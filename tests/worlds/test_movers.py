@@ -226,13 +226,6 @@ def test_wanderers_draw_from_the_runs_seed_unless_they_have_one_of_their_own():
     assert (one == trajectories(own, shared, shared, seed=0).positions(FINE)).all()
 
 
-def test_extending_a_walk_does_not_change_it():
-    mover = Wandering(radius=0.2, cell=0.5, period=0.4)
-    whole, parts = trajectories(mover, obstacles=POSTS), trajectories(mover, obstacles=POSTS)
-    asked = [parts.positions(t)[0] for t in FINE]
-    assert (whole.positions(FINE) == np.array(asked)).all()
-
-
 # All kinds
 
 KINDS = [

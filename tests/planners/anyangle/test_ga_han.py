@@ -31,11 +31,6 @@ def assert_feasible(result, query):
     assert result.length == pytest.approx(polyline_length(xy), abs=1e-9)
 
 
-def test_the_registered_defaults_are_those_of_the_thesis():
-    assert (GaHan().population, GaHan().iterations, GaHan().crossover, GaHan().mutation) == (100, 100, 0.25, 0.2)
-    assert GaHan().elitism
-
-
 def test_the_median_of_20_seeds_beats_the_thesis():
     query = single()
     results = [solve(query, seed) for seed in range(20)]
@@ -127,10 +122,6 @@ def test_a_bare_grid_is_planned_on_its_free_cells():
         query = random_query(rng, largest=10)
         answer = solve(query, seed, iterations=3, tries=500)
         assert answer.solved == bool(len(answer.cells))
-
-
-def test_options_are_read():
-    assert load_planner("ga-han", via_points="2", elitism="no") == GaHan(via_points=2, elitism=False)
 
 
 def of_catalogue(name):

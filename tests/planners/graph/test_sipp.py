@@ -171,18 +171,6 @@ def test_no_path_arrives_sooner_and_none_is_missed(seeds, stay):
     assert without > 0
 
 
-def test_reaching_a_goal_that_must_stay_safe_may_take_longer(small_plans):
-    later = 0
-    for query, movers, plan in small_plans:
-        stays = plan_in_time(query, movers, speed=SPEED, horizon=HORIZON, stay=True)
-        assert stays.duration >= plan.duration - 1e-9
-        if stays.solved:
-            t = np.linspace(stays.arrive[-1], HORIZON, 2000)
-            assert all(np.hypot(*(m.at(t) - stays.xy[-1]).T).min() >= m.radius + INFLATE for m in movers)
-        later += plan.solved and stays.duration > plan.duration
-    assert later > 3
-
-
 def test_the_distance_is_kept_at_every_instant(small_plans):
     careless = 0
     for query, movers, plan in small_plans:
@@ -253,13 +241,6 @@ def test_a_robot_backs_into_a_bay_to_let_a_mover_pass():
     shut = plan_in_time(Query(ground(free[:1]), (0, 2), (0, 8)), [oncoming], speed=SPEED, horizon=60)
     assert shut.status is PlanStatus.NO_PATH
     assert "within 60 s" in shut.reason
-
-
-def test_two_robots_do_not_change_places_through_each_other():
-    """A corridor never has room for both the robot and an oncoming mover."""
-    swap = Passing(0.05, (1.0, 0.0), (-0.5, 0.0))
-    plan = plan_in_time(corridor(3), [swap], speed=SPEED, horizon=10)
-    assert plan.status is PlanStatus.NO_PATH
 
 
 def test_without_movers_it_is_the_shortest_path():

@@ -141,7 +141,7 @@ def test_the_same_seed_gives_the_same_answers(name):
 def test_a_planner_s_own_replanner_is_used_if_it_has_one():
     query, rng = catalogue()["empty"], np.random.default_rng(0)
     kinds = {name: type(replanner_for(PLANNERS[name], query, rng)).__name__ for name in ("dstar", "dstar-lite", "ants")}
-    assert kinds == {"dstar": "DStarSearch", "dstar-lite": "DStarLiteSearch", "ants": "WarmStartedColony"}
+    assert kinds == {"dstar": "IncrementalSearch", "dstar-lite": "IncrementalSearch", "ants": "WarmStartedColony"}
     assert isinstance(replanner_for(PLANNERS["mmas"], query, rng), ReplanFromScratch)
 
 

@@ -4,7 +4,6 @@ import json
 import math
 import os
 import stat
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,7 +26,7 @@ from antdrive.worlds import (
     task_schema,
     task_to_dict,
 )
-from tests.worlds.malformed import GOOD, MALFORMED
+from tests.worlds.malformed import GOOD
 
 TASK = Task(
     World("one", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 1.0), Disc(2.5, 6.125, 0.5, 2.0)), "made up"),
@@ -58,15 +57,6 @@ def refusal(call):
 
 def test_the_unchanged_file_of_the_malformed_ones_is_read(tmp_path):
     assert load_task(write(tmp_path, GOOD)).world.name == "bad"
-
-
-@pytest.mark.parametrize("case", ["alias bomb", "deep nesting", "five thousand digits"])
-def test_a_hostile_file_is_refused_quickly(case, tmp_path):
-    path = write(tmp_path, MALFORMED[case])
-    started = time.process_time()
-    with pytest.raises(InputError):
-        load_task(path)
-    assert time.process_time() - started < 30
 
 
 @given(st.text(max_size=200))

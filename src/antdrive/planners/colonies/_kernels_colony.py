@@ -192,19 +192,6 @@ def walk_ants(
 
 
 @kernel
-def summarise(lengths: Array) -> tuple[int, float, int]:
-    """Return the number of walks that arrived, their mean length, and the row of the shortest; others have length inf."""
-    count, total, first = 0, 0.0, 0
-    for a in range(len(lengths)):
-        if lengths[a] < np.inf:
-            count += 1
-            total += lengths[a]
-            if lengths[a] < lengths[first]:
-                first = a
-    return count, (total / count if count else np.inf), first
-
-
-@kernel
 def copy_without_loops(walk: Array, size: int, last: Array, tour: Array) -> int:
     """Write the walk without loops to `tour`, continuing from the last visit of each cell; returns the tour's size.
 
@@ -218,18 +205,6 @@ def copy_without_loops(walk: Array, size: int, last: Array, tour: Array) -> int:
         n += 1
         s = last[walk[s]] + 1
     return n
-
-
-@kernel
-def cut_loops(
-    walks: Array, sizes: Array, mask: Array, to: Array, tours: Array, tour_sizes: Array, lengths: Array
-) -> None:
-    """Write walk a without loops to row a of `tours`."""
-    last = np.empty(len(mask), dtype=np.int64)
-    for a in range(len(sizes)):
-        n = copy_without_loops(walks[a], sizes[a], last, tours[a])
-        tour_sizes[a] = n
-        lengths[a] = walk_length(tours[a], n, to) if n else np.inf
 
 
 @kernel
@@ -256,31 +231,20 @@ def cut_one_short(walk: Array, size: int, mask: Array, to: Array, first: int, pl
 
 
 @kernel
-def cut_short(
-    walks: Array, sizes: Array, mask: Array, to: Array, tours: Array, tour_sizes: Array, lengths: Array
+def cut(
+    walks: Array, sizes: Array, mask: Array, to: Array, short: bool, tours: Array, tour_sizes: Array, lengths: Array
 ) -> None:
-    """Write walk a cut short to row a of `tours`."""
+    """Write walk a to row a of `tours`, cut `short` or without its loops alone."""
     place = np.full(len(mask), -1, dtype=np.int64)
     first: Any = np.int64(0)  # a literal 0 would compile `cut_one_short` a second time
     for a in range(len(sizes)):
-        n = cut_one_short(walks[a], sizes[a], mask, to, first, place, tours[a])
-        first += sizes[a]
+        if short:
+            n = cut_one_short(walks[a], sizes[a], mask, to, first, place, tours[a])
+            first += sizes[a]
+        else:
+            n = copy_without_loops(walks[a], sizes[a], place, tours[a])
         tour_sizes[a] = n
         lengths[a] = walk_length(tours[a], n, to) if n else np.inf
-
-
-@kernel
-def evaporate(trail: Array, evaporation: float) -> None:
-    """Multiply a flat `trail` by 1 - evaporation."""
-    for i in range(len(trail)):
-        trail[i] *= 1.0 - evaporation
-
-
-@kernel
-def clamp(trail: Array, least: float, most: float) -> None:
-    """Clamp a flat `trail` to [least, most]."""
-    for i in range(len(trail)):
-        trail[i] = min(max(trail[i], least), most)
 
 
 @kernel
@@ -418,29 +382,6 @@ def detour_weights(
             if mask[i] & (1 << k):
                 detour = (SQRT2 if k & 1 else 1.0) + to_goal[after(to, i, k)] - to_goal[i]
                 weights[i, k] = math.exp(-greed * detour)
-
-
-@kernel
-def goal_pull(mask: Array, cell: Array, cols: int, r1: int, c1: int, plain: bool, out: Array) -> None:
-    """Set out[i, k] to the cosine between move k and the vector from node i to the goal, at least 0; or to their dot product."""
-    for i in range(len(mask)):
-        here = cell[i] if len(cell) else i
-        dr, dc = r1 - here // cols, c1 - here % cols
-        distance = math.hypot(dr, dc)
-        for k in range(8):
-            out[i, k] = 0.0
-            if distance > 0.0 and mask[i] & (1 << k):
-                dot = DROW[k] * dr + DCOL[k] * dc
-                along = dot / distance
-                out[i, k] = dot if plain else max(0.0, along / SQRT2 if k & 1 else along)
-
-
-@kernel
-def fixed_pull(mask: Array, dr: float, dc: float, out: Array) -> None:
-    """Set out[i, k] to the dot product of move k (not normalised) and a direction common to all cells, at least 0."""
-    for i in range(len(mask)):
-        for k in range(8):
-            out[i, k] = max(0.0, DROW[k] * dr + DCOL[k] * dc) if mask[i] & (1 << k) else 0.0
 
 
 @kernel

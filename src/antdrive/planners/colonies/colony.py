@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -26,6 +26,9 @@ if TYPE_CHECKING:  # importing a grid loads the compiler
 Flat = npt.NDArray[np.int32]  # flat cell indices
 Weights = npt.NDArray[np.float32]  # (nodes, 8)
 Heuristic = npt.NDArray[np.floating[Any]]  # (nodes, 8)
+
+#: The length of each move [cells].
+STEP = np.sqrt([1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +101,11 @@ class ColonyGraph:
         """Return the value of each node's cell (nodes,), from those of the cells (R, C)."""
         return values.ravel()[self.turns.cell] if self.turns else values.ravel()
 
+    @property
+    def allowed(self) -> npt.NDArray[np.bool_]:
+        """Whether each move is allowed (nodes, 8)."""
+        return self.mask[:, np.newaxis] >> np.arange(8) & 1 > 0
+
     def nearness(self) -> Floats:
         """Return 1 / distance from the target of each move to the goal (nodes, 8) [1/cells]; -inf where it is not allowed."""
         # The goal's distance is 0; the bound makes every ant beside the goal step onto it.
@@ -145,9 +153,9 @@ class Walks:
 
     def summary(self) -> WalkSummary:
         """Count the ants that arrived and measure their walks."""
-        from antdrive.planners.colonies import _kernels_colony
-
-        return WalkSummary(*_kernels_colony.summarise(self.lengths))
+        lengths = self.lengths[np.isfinite(self.lengths)]
+        mean = float(lengths.cumsum()[-1]) / len(lengths) if len(lengths) else math.inf
+        return WalkSummary(len(lengths), mean, int(self.lengths.argmin()))
 
     @classmethod
     def allocate(cls, ants: int, room: int) -> Walks:
@@ -445,27 +453,19 @@ class TourConstruction:
 
     def shorten(self, ants: slice) -> Walks:
         """Return the tours of some ants: without loops and, with `Colony.shortcut`, cut short."""
-        walks, tours = self.walks.rows(ants), self.shortened.rows(ants)
-        if self.planner.shortcut:
-            return cut_short(walks, self.graph, tours)
-        return without_loops(walks, self.graph, tours) if self.planner.revisit else walks
+        walks, planner = self.walks.rows(ants), self.planner
+        if planner.shortcut or planner.revisit:
+            return cut(walks, self.graph, self.tours.rows(ants), short=planner.shortcut)
+        return walks
 
 
-def without_loops(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Walks:
-    """Return the walks with their loops cut out."""
+def cut(walks: Walks, graph: ColonyGraph, tours: Walks | None = None, *, short: bool) -> Walks:
+    """Return the walks without loops, in `tours` if given.
+
+    Cut `short` they lead from each cell straight to the walk's last cell that is one allowed move away.
+    """
     from antdrive.planners.colonies import _kernels_colony
 
-    return _cut(_kernels_colony.cut_loops, walks, graph, out)
-
-
-def cut_short(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Walks:
-    """Return the walks cut short: from each cell straight to the walk's last cell that is one allowed move away."""
-    from antdrive.planners.colonies import _kernels_colony
-
-    return _cut(_kernels_colony.cut_short, walks, graph, out)
-
-
-def _cut(kernel: Callable[..., None], walks: Walks, graph: ColonyGraph, out: Walks | None) -> Walks:
-    tours = Walks.allocate(*walks.cells.shape) if out is None else out
-    kernel(walks.cells, walks.sizes, graph.mask, graph.to, tours.cells, tours.sizes, tours.lengths)
+    tours = tours or Walks.allocate(*walks.cells.shape)
+    _kernels_colony.cut(walks.cells, walks.sizes, graph.mask, graph.to, short, tours.cells, tours.sizes, tours.lengths)
     return tours
