@@ -84,7 +84,7 @@ def test_moves_are_chosen_in_proportion_to_their_weights():
     count = 40_000
     seeds = np.random.default_rng(1).bit_generator.random_raw(count).astype(np.uint64)
     cells, sizes = np.zeros((count, 2), dtype=np.int32), np.zeros(count, dtype=np.int64)
-    _kernels_colony.walk_ants(weights, graph.mask, graph.to, 4, 0, 1, 0.0, False, seeds, cells, sizes, np.zeros(count))
+    _kernels_colony.walk_ants(weights, graph.arrays, 1, 0.0, False, seeds, cells, sizes, np.zeros(count))
     went = np.array([(cells[:, 1] == 4 + step).mean() for step in graph.to])
     np.testing.assert_allclose(went, weights[4] / weights[4].sum(), atol=0.01)
     assert went[[2, 5]].max() == 0

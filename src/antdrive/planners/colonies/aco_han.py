@@ -117,7 +117,7 @@ class AcoHan(Colony):
 
         by_fraction = self.form != "listing"
         _kernels_colony.attracted_weights(
-            trail, graph.mask, graph.to, heuristic, self.attraction, by_fraction, self.min_weight, weights
+            trail, graph.arrays, heuristic, self.attraction, by_fraction, self.min_weight, weights
         )
 
     def update(self, trail: Floats, state: IterationState) -> None:

@@ -20,6 +20,7 @@ from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Query
 
 if TYPE_CHECKING:  # importing a grid loads the compiler
+    from antdrive.planners.colonies._kernels_colony import AntGraph
     from antdrive.worlds._kernels_turns import MoveGraph
     from antdrive.worlds.grid import Turns
 
@@ -57,6 +58,13 @@ class ColonyGraph:
             _kernels_colony.table_of(grid.graph, kept, goal, mask, to)
             mask.setflags(write=False)  # as a grid's
         return cls(mask, to, grid.shape, query.start_node, goal, grid.turns)
+
+    @property
+    def arrays(self) -> AntGraph:
+        """The graph for compiled ants."""
+        from antdrive.planners.colonies._kernels_colony import AntGraph
+
+        return AntGraph(self.mask, self.to, self.turns.cell, self.shape[1], self.start, self.goal)
 
     @property
     def moves(self) -> MoveGraph:
@@ -433,23 +441,10 @@ class TourConstruction:
     def _send(self, seeds: npt.NDArray[np.uint64], kind: int, ants: slice) -> int:
         from antdrive.planners.colonies import _kernels_colony
 
-        walks = self.walks.rows(ants)
-        return int(
-            _kernels_colony.walk_ants(
-                self.weights[kind],
-                self.graph.mask,
-                self.graph.to,
-                self.graph.start,
-                self.graph.goal,
-                self.limit,
-                float(self.planner.revisit),
-                self.planner.backtrack,
-                seeds,
-                walks.cells,
-                walks.sizes,
-                walks.lengths,
-            )
-        )
+        walks, planner = self.walks.rows(ants), self.planner
+        rules = self.limit, float(planner.revisit), planner.backtrack
+        out = walks.cells, walks.sizes, walks.lengths
+        return int(_kernels_colony.walk_ants(self.weights[kind], self.graph.arrays, *rules, seeds, *out))
 
     def shorten(self, ants: slice) -> Walks:
         """Return the tours of some ants: without loops and, with `Colony.shortcut`, cut short."""
@@ -467,5 +462,6 @@ def cut(walks: Walks, graph: ColonyGraph, tours: Walks | None = None, *, short: 
     from antdrive.planners.colonies import _kernels_colony
 
     tours = tours or Walks.allocate(*walks.cells.shape)
-    _kernels_colony.cut(walks.cells, walks.sizes, graph.mask, graph.to, short, tours.cells, tours.sizes, tours.lengths)
+    out = tours.cells, tours.sizes, tours.lengths
+    _kernels_colony.cut(walks.cells, walks.sizes, graph.arrays, short, *out)
     return tours
