@@ -221,14 +221,6 @@ def test_a_tour_cut_short_has_allowed_moves_and_is_never_longer(seed):
             assert there == max(p for p in range(here + 1, len(old)) if old[p] in reach)
 
 
-def test_a_walk_around_a_corner_is_cut_as_in_a_hand_calculation():
-    detour = [(0, 0), (0, 1), (0, 2), (1, 2), (1, 1), (2, 1), (2, 2), (2, 3)]
-    tours = cut(walks(detour), GRAPH, short=True)
-    # The last cell of the walk beside (0, 0) is (1, 1); the last one beside (1, 1) is (2, 2).
-    assert GRAPH.cells(tours.cells[0, : tours.sizes[0]]).tolist() == [[0, 0], [1, 1], [2, 2], [2, 3]]
-    assert tours.lengths[0] == pytest.approx(1 + 2 * math.sqrt(2))
-
-
 # Ant system (suganthi2019 section III, ibraheem2016 section 3.1)
 
 
@@ -410,15 +402,6 @@ def test_merging_ants_find_the_shortest_paths_on_random_grids(size, seed):
 def test_merging_ants_come_within_a_percent_over_large_grids(seed):
     query = grid_query(100, 0.25, seed)
     assert solve(MergingAnts(), query, seed).cost <= 1.01 * optimum(query)
-
-
-def test_merging_ants_get_through_a_maze():
-    free = np.zeros((21, 21), dtype=np.bool_)
-    free[1::2, 1:-1] = True
-    for row in range(2, 20, 2):
-        free[row, 1 if row % 4 else 19] = True
-    query = Query(Grid.from_free(free), (1, 1), (19, 19))
-    assert solve(MergingAnts(iterations=5), query).cost == pytest.approx(optimum(query))
 
 
 @pytest.mark.parametrize("best", [1, 2, 3])

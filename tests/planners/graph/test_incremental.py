@@ -72,29 +72,6 @@ def test_a_blocked_end_is_named_and_can_be_cleared(planner, end):
 
 
 @BOTH
-def test_the_end_of_an_isolated_cell_can_be_blocked(planner):
-    free = np.zeros((3, 3))
-    free[1, 1] = 1
-    replanner = planner.replanner(Query(Grid.from_free(free), (1, 1), (1, 1)), RNG)
-    assert replanner.result().cost == 0
-    assert replanner.block([(1, 1)]) == 0  # it had no moves to lose
-    assert replanner.result().status is PlanStatus.NO_PATH
-
-
-@BOTH
-def test_moves_that_discs_close_stay_closed(planner):
-    rng = np.random.default_rng(7)
-    for _ in range(30):
-        query = random_discs(rng)
-        replanner = planner.replanner(query, RNG)
-        cells = rng.choice(np.argwhere(query.grid.free), size=6)
-        replanner.block(cells)
-        replanner.clear(cells)
-        np.testing.assert_array_equal(replanner.query.grid.moves, query.grid.moves)
-        np.testing.assert_array_equal(replanner.query.grid.free, query.grid.free)
-
-
-@BOTH
 def test_the_first_query_is_unchanged_and_the_present_one_is_read_only(planner):
     query = open_ground()
     replanner = planner.replanner(query, RNG)
