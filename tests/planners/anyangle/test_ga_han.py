@@ -169,11 +169,6 @@ def test_all_chromosomes_are_feasible_in_every_generation():
     assert result.field.max() == Hybrid().population
 
 
-def test_a_straight_line_stays_straight():
-    query = of_catalogue("empty")
-    assert hybrid(query).length == pytest.approx(np.hypot(*np.subtract(query.task.goal, query.task.start[:2])))
-
-
 def test_interrupted_during_the_ants_it_returns_their_pulled_path():
     query = of_catalogue("u-trap")
 
