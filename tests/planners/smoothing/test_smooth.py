@@ -326,15 +326,6 @@ def test_spare_length_is_spent_only_once():
     assert route.length <= cost + 1e-9
 
 
-def test_without_room_for_more_clearance_the_line_stays_taut():
-    """A taut plan has no spare length for more clearance."""
-    task, grid, plan = one_disc(1)
-    taut = smooth(plan, grid, task)
-    again = PlanResult(status=PlanStatus.SOLVED, waypoints=grid.fractional(taut.xy))
-    route = smooth(again, grid, task, kind="clearance")
-    assert route.length <= taut.length + 1e-9
-
-
 def test_none_is_the_plans_own_line_and_misuse_is_refused():
     task, grid, plan = one_disc(1)
     route = smooth(plan, grid, task, kind="none")
