@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from antdrive.base import Floats, Point, Pose
 from antdrive.base.plane import format_position
-from antdrive.base.records import derived
+from antdrive.base.records import unchecked_copy
 from antdrive.planners import Query
 from antdrive.planners.graph.search import reachable
 from antdrive.robots import TrackedPath
@@ -115,7 +115,7 @@ def with_obstacles(task: Task, discs: Sequence[Disc]) -> Task:
         return task
     more = np.array([(disc.x, disc.y, disc.radius) for disc in discs])
     world = PointWorld.of(task.world.name, task.world.bounds, np.concatenate((task.world.discs, more)))
-    return derived(task, world=world)
+    return unchecked_copy(task, world=world)
 
 
 class Search(NamedTuple):

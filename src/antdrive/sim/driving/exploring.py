@@ -16,7 +16,7 @@ import numpy as np
 
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.kernel_cache import clock
-from antdrive.base.records import derived
+from antdrive.base.records import unchecked_copy
 from antdrive.planners import PlanResult, PlanStatus, Query, smooth
 from antdrive.robots import TrackedPath, Twist, outline_of
 from antdrive.robots.control.pursuit import obstacles_around
@@ -223,7 +223,7 @@ class Exploration(RouteGuide):
         line = np.empty((len(points) + 2, 2))
         line[0], line[1:-1], line[-1] = pose[:2], points, self._task.goal
         discs = _kernels_hits.near_polyline(line, seen, grid.inflate + CORRIDOR)
-        near = derived(task, world=SEEN.among(bounds, discs))
+        near = unchecked_copy(task, world=SEEN.among(bounds, discs))
         route = smooth(answer, grid, with_obstacles(near, avoided), kind=self._routes.smoothing)
         tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
         self._points = RoutePoints.of(route, near.world, grid.inflate)
@@ -251,7 +251,7 @@ class Exploration(RouteGuide):
             discs = self._movers.without_trails(discs, pose)
         ends = np.array((pose[:2], self._task.goal))
         discs = _kernels_hits.beside(discs, ends, COVERS)  # hits that cover one of them are map errors
-        known = derived(self._task, world=SEEN.among(bounds, discs), start=pose)
+        known = unchecked_copy(self._task, world=SEEN.among(bounds, discs), start=pose)
         self._known_as = key, known
         return known
 
@@ -261,7 +261,7 @@ class Exploration(RouteGuide):
         tracked = self._routes.prepared(route, world, margin, SAMPLES, indexed=False)
         foot, tuning = robot.footprint, tracked.tuning
         give = FORGIVING + CORNERED * (robot.radius - foot.inner_radius)
-        return derived(
+        return unchecked_copy(
             tracked,
             tuning=tuning._replace(
                 lookahead_clearance=tuning.lookahead_clearance - give,
