@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 from antdrive.base.files import relative
+from antdrive.base.tables import markdown_text
 from antdrive.base.version import __version__
 from antdrive.runs.statistics.intervals import Interval
 from antdrive.sim.facts import FACTS, Fact
@@ -212,18 +213,13 @@ def _environment() -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
         autoescape=jinja2.select_autoescape(["html.j2"]),
     )
-    environment.filters |= {"md": markdown_text, "fence": fence_for}
+    environment.filters |= {"md": lambda value: markdown_text(str(value)), "fence": fence_for}
     return environment
 
 
 def link_to(path: Path, base: Path) -> str:
     """Return a file's path relative to the page's folder, quoted for a URL."""
     return quote(relative(path.resolve(), base.resolve()))
-
-
-def markdown_text(value: object) -> str:
-    """Escape a text for Markdown, its tables and HTML blocks."""
-    return re.sub(r"[&<>|`*_~\[\]\\@#]", lambda found: f"&#{ord(found[0])};", str(value))
 
 
 def fence_for(code: str) -> str:
