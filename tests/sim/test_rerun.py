@@ -1,5 +1,6 @@
 """The scenario of a log drives the same log again; a forged value does not follow from any scenario."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -103,6 +104,14 @@ def test_the_first_row_that_differs_is_named(seen):
     assert f"replay: the rerun differs in tracks, from t = {tracks[-1, 0] / 80:.3f} s" in problems
     assert f"replay: the rerun differs in route, from point {len(seen.route)}" in problems
     assert sum("the rerun differs in" in problem for problem in problems) == 3
+
+
+@pytest.mark.parametrize("name", ["estimate", "actuated"])
+def test_noise_is_that_of_the_seed_to_a_millionth(name, noisy):
+    again = rerun(noisy)
+    for error, rounded in ((5e-7, True), (2e-6, False)):
+        (found,) = mismatches(replace(noisy, **{name: getattr(noisy, name) + error}), again)
+        assert (found.name, found.rounded) == (name, rounded)
 
 
 def test_headings_are_compared_on_the_circle(seen, seen_again):
@@ -227,6 +236,7 @@ def test_only_values_within_rounding_and_rows_that_differ_are_listed():
     assert replace(check, problems=()).sentence.startswith("replayed within rounding (pose): at most")
     assert replace(check, problems=(), rounded=()).sentence.startswith("replayed within rounding: at most")
     assert replace(check, position=0.0).sentence == "the replay differs"
+    assert replace(check, position=math.nan).sentence == "not replayed"
 
 
 def test_rounding_is_a_millimetre(small_run):

@@ -270,7 +270,7 @@ def evaluate_case(case: SuiteCase, *, update: Update = "", results: Results | No
 
 
 def _evaluate_or_fail(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
-    """Return the result of a test; errors become failures, so that a broken test does not stop the others."""
+    """Return the result of a test; errors of its drive become failures, so that they do not stop the others."""
     raised: Exception
     try:
         return evaluate_case(case, update=update, results=results)

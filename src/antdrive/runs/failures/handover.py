@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,9 +31,7 @@ from antdrive.worlds import save_task
 PINNED = ("smoothing", "noise")
 
 
-def write_suite(
-    path: Path, failures: Sequence[Attempt], notes: Iterable[str] = itertools.repeat(""), bound: Bound | None = None
-) -> Path:
+def write_suite(path: Path, failures: Sequence[Attempt], notes: Sequence[str] = (), bound: Bound | None = None) -> Path:
     """Write a suite, its worlds, and the robots that are not in the catalogue.
 
     The suite has no baselines: it passes as long as the scenarios fail in the same way. A scenario whose planner raises an
@@ -42,7 +40,7 @@ def write_suite(
     Args:
         path: the suite's file; its name ends in .drive.yaml
         failures: the failing runs; their worlds' names differ, and name the scenarios
-        notes: a remark on each for readers; may be empty
+        notes: a remark on each for readers, which may be empty; none by default
         bound: the metric's bound that they cross, if that is their failure
 
     Returns:
@@ -53,7 +51,7 @@ def write_suite(
     """
     entries: dict[str, Any] = {}
     robots: dict[str, RobotSpec] = {}
-    for failed, note in zip(failures, notes, strict=False):
+    for failed, note in zip(failures, notes or [""] * len(failures), strict=True):
         name = failed.scenario.task.world.name
         world = Path("worlds") / f"{name}.yaml"
         save_task(failed.scenario.task, path.parent / world)

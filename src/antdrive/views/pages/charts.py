@@ -60,7 +60,7 @@ def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> l
                 charts.append(_profile(name, performance_profiles(values), int(whole.sum()), styles))
     if whole.any():
         for name in known_metrics(paired, DISTRIBUTED):
-            charts.append(_distribution(name, distributions(paired.values(name)[whole]), int(whole.sum()), styles))
+            charts.append(_distribution(name, distributions(_values(paired, name)[whole]), int(whole.sum()), styles))
     common = np.asarray(paired.success.all(axis=1)) & whole
     if common.any():
         charts += [
@@ -147,7 +147,7 @@ def _size_boxes(paired: PairedRuns, name: str, common: Flags, styles: Sequence[L
         return []
     common = common & np.isfinite(sizes)
     group = np.clip(np.searchsorted(edges, sizes, side="right") - 1, 0, len(edges) - 2)
-    values = paired.values(name)
+    values = _values(paired, name)
     groups = [[values[common & (group == g), k] for g in range(len(edges) - 1)] for k in range(len(paired.planners))]
     exact = edges[-1] == edges[-2]
     labels = [_round(edge) for edge in edges[:-1]] if exact else [f"≤{_round(edge)}" for edge in edges[1:]]
@@ -195,7 +195,7 @@ def _boxes_of_option(
     common = paired.success[:, mine].all(axis=1) & paired.counted(*mine)
     charts = []
     for name in known_metrics(paired, BOXED):
-        boxes = [paired.values(name)[common, k] for k in mine]
+        boxes = [_values(paired, name)[common, k] for k in mine]
         if common.sum() < FEWEST:
             continue
 
@@ -319,6 +319,11 @@ def _svg(figure: Figure, styles: Sequence[LabelStyle]) -> str:
     text = re.sub(r' id="[\w.]+_\d+"', "", text)  # ids would repeat in every chart
     colours = {style.light: f"--planner-{k}" for k, style in enumerate(styles)} | PAGE_COLOURS
     return re.sub("#[0-9a-f]{6}", lambda match: f"var({colours[match[0]]})" if match[0] in colours else match[0], text)
+
+
+def _values(paired: PairedRuns, name: str) -> Floats:
+    """Return a metric's values in the unit of its title."""
+    return Quantity.of(name).factor * paired.values(name)
 
 
 def _plain(name: str) -> str:

@@ -66,7 +66,7 @@ def _effect(paired: PairedRuns, row: PairedComparison, over: str) -> str:
             f"{row.first} succeeded in {shares[0]} % and {row.second} in {shares[1]} % of {over}: difference "
             f"{percent(row.difference)} points, 95 % interval {percents(row.interval)} ({method})"
         )
-    quantity = Quantity.of(row.measure, [row.difference])
+    quantity = Quantity.of(row.measure)
     median = f"{quantity.text(row.difference)} {quantity.unit}".rstrip()
     low, high = map(quantity.text, row.interval)
     return (

@@ -6,7 +6,7 @@ import functools
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -55,9 +55,16 @@ TITLES = {
     "drive_wall_s": "wall time of the drive",
     "path_length_m": "planned length",
     "bound_m": "certified clearance",
+    "physics_hz": "physics rate",
+    "control_hz": "control rate",
 }
 UNITS = ("_rad_per_m", "_m2", "_m", "_s", "_hz")  # suffixes of names
-FRACTIONS = ("gap_to_grid_optimum", "gap_to_euclidean_optimum")  # shown in percent
+#: Units in which pages show facts, and their factors, where these are not the facts' own.
+SHOWN_IN = {
+    "plan_s": ("ms", 1000.0),
+    "gap_to_grid_optimum": ("%", 100.0),
+    "gap_to_euclidean_optimum": ("%", 100.0),
+}
 
 
 class Quantity(NamedTuple):
@@ -68,16 +75,13 @@ class Quantity(NamedTuple):
     factor: float  # from the column's own unit
 
     @classmethod
-    def of(cls, name: str, values: Iterable[Any] = ()) -> Quantity:
-        """Return the quantity of a column: gaps are in percent, wall times in milliseconds if all values are below 1 s."""
+    def of(cls, name: str) -> Quantity:
+        """Return the quantity of a column."""
         fact = _fact_of(name)
         unit = "" if fact is None or fact.unit == "1" else fact.unit
         plain = next((name.removesuffix(suffix) for suffix in UNITS if unit and name.endswith(suffix)), name)
         title = TITLES.get(name, plain.removeprefix("option.").replace("_", " "))
-        if name in FRACTIONS:
-            return cls(title, "%", 100.0)
-        sizes = [abs(size) for value in values if (size := number(value))] if fact and fact.proof == "clock" else []
-        return cls(title, "ms", 1000.0) if sizes and max(sizes) < 1 else cls(title, unit, 1.0)
+        return cls(title, *SHOWN_IN.get(name, (unit, 1.0)))
 
     @property
     def heading(self) -> str:
@@ -89,9 +93,9 @@ class Quantity(NamedTuple):
         return short(self.factor * value)
 
 
-def measure_title(name: str, values: Iterable[Any] = ()) -> str:
-    """Return a column's heading with the unit that fits its values."""
-    return Quantity.of(name, values).heading
+def measure_title(name: str) -> str:
+    """Return a column's heading with its unit."""
+    return Quantity.of(name).heading
 
 
 def _fact_of(name: str) -> Fact | None:
@@ -101,7 +105,7 @@ def _fact_of(name: str) -> Fact | None:
 
 def with_unit(name: str, value: Any) -> tuple[str, str]:
     """Return the title of a fact and its value with the unit; another name and value as they are."""
-    quantity, known = Quantity.of(name, [value]), number(value)
+    quantity, known = Quantity.of(name), number(value)
     if _fact_of(name) is None:
         return name, shown(value)
     if known is None:
@@ -166,7 +170,7 @@ def json_column(name: str, values: Sequence[Any]) -> dict[str, Any] | None:
     if all(value is None for value in values):
         return None
     if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
-        factor = Quantity.of(name, values).factor
+        factor = Quantity.of(name).factor
         return {
             "name": name,
             "numbers": [_number(value) for value in values],

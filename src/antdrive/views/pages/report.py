@@ -132,7 +132,7 @@ class Report:
     @functools.cached_property
     def quantities(self) -> dict[str, Quantity]:
         """How the columns are shown."""
-        return {name: Quantity.of(name, values) for name, values in self.table.columns.items()}
+        return {name: Quantity.of(name) for name in self.table.columns}
 
     def heading(self, run: ReportedRun) -> str:
         """Return the heading of a run's section: the run, and its settings that differ from another run's."""

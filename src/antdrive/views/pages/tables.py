@@ -25,7 +25,7 @@ LATEX_PAGE = 40  # table rows per page
 def success_cells(summary: CampaignSummary) -> TextTable:
     """Return each planner's success rate and its medians over the instances solved by all planners."""
     medians = summary.medians.values()
-    quantities = [Quantity.of(name, [median for median, _ in rows]) for name, rows in summary.medians.items()]
+    quantities = [Quantity.of(name) for name in summary.medians]
     elsewhere = any(row.elsewhere for row in summary.success)
     over = any(not math.isnan(row.over_worlds.low) for row in summary.success)
     headings = (
@@ -68,7 +68,7 @@ def pair_cells(measure: str, comparisons: Sequence[PairedComparison]) -> TextTab
         *([] if success else ["dropped"]),
         *(["unpaired"] if unpaired else []),
     )
-    quantity = Quantity.of(measure, [row.difference for row in comparisons])
+    quantity = Quantity.of(measure)
     title, shown = ("Success of pairs", percent) if success else (quantity.heading, quantity.text)
     return TextTable(title, headings, [_pair_row(row, shown, over, unpaired) for row in comparisons])
 
@@ -141,7 +141,7 @@ def allowance_cells(summary: CampaignSummary) -> TextTable:
     headings = ("planner", "against", "measure", "not worse", "allowed", "advantage", "95 % of all", "worlds", "needed")
     rows: list[tuple[str, ...]] = []
     for row in summary.allowances:
-        quantity = Quantity.of(row.measure, [row.allowed, row.advantage])
+        quantity = Quantity.of(row.measure)
         title, shown = ("success [%]", percent) if row.measure == SUCCESS else (quantity.heading, quantity.text)
         passed = "yes" if row.not_worse else NONE
         ends = f"{shown(row.interval.low)} to {shown(row.interval.high)}"
