@@ -69,7 +69,7 @@ nitpick_ignore_regex = [
     ),
     ("py:.*", r"(typing|collections|pathlib|enum|os|types|abc|contextlib|dataclasses)\.[\w.]+"),
     # Arrays as compiled code takes them; no part of what is offered.
-    ("py:class", r"antdrive\.[\w.]+\._kernels_\w+\.\w+|MoveGraph"),
+    ("py:class", r"antdrive\.[\w.]+\._kernels_\w+\.\w+|MoveGraph|AntGraph"),
     # How `sweep` words the origin of random tasks.
     ("py:class", r"antdrive\.runs\.campaigns\.job\.TaskOrigin"),
     ("py:class", "ErrorAt"),  # a type of functions

@@ -50,9 +50,10 @@ cost = np.array(
 figure = Figure(figsize=(6.4, 3.8), layout="constrained")
 axes = figure.add_subplot(label="profile")
 for planner, curve in zip(planners, performance_profiles(cost), strict=True):
+    shown = curve.x <= 1.1
     axes.step(
-        [1.0, *curve.x, 1.1],
-        [0.0, *curve.fraction, curve.at(1.1)],
+        [1.0, *curve.x[shown], 1.1],
+        [0.0, *curve.fraction[shown], curve.fraction[shown].max(initial=0.0)],
         where="post",
         label=planner,
         lw=2,
