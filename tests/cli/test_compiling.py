@@ -8,7 +8,8 @@ import pytest
 
 from antdrive.base import kernel_cache
 from antdrive.base.kernel_cache import COMPILING
-from antdrive.cli.console import bar, report_compiling
+from antdrive.base.progress import bar
+from antdrive.cli.console import report_compiling
 from antdrive.planners import PLANNERS
 from antdrive.views.warming import plan_with
 

@@ -13,7 +13,6 @@ from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
 from antdrive.base.errors import amount, visible
-from antdrive.base.progress import bar as bar
 from antdrive.base.progress import shown_progress
 from antdrive.base.tables import BAD, GOOD
 from antdrive.cli.commands import DEBUG

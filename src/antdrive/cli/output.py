@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import amount
-from antdrive.cli.console import bar, print_error, this_command
+from antdrive.base.progress import bar
+from antdrive.cli.console import print_error, this_command
 from antdrive.cli.exits import INTERNAL_ERROR, SUCCEEDED
 from antdrive.runs.results_folder import free_folder, opened
 from antdrive.views.run_folder import check_folder

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.checks import grouped
 from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.progress import bar
 from antdrive.base.version import require_physics
-from antdrive.cli.console import bar, print_error
+from antdrive.cli.console import print_error
 from antdrive.cli.options import Planner, Robot, option
 from antdrive.cli.parse import numbers, pose
 

@@ -31,9 +31,7 @@ from antdrive.sim.recorded import rebuilt
 from antdrive.sim.scenario import Scenario
 
 ROUNDING = 1e-3  # tolerance of a rerun on another machine or version [m], [rad], [m/s], [rad/s]
-SAME_NOISE = (
-    1e-6  # tolerance of estimates and motor targets where a rerun repeats the motion bit for bit, in the same units
-)
+SAME_NOISE = 1e-6  # the same of estimates and motor targets where the rerun repeats the motion bit for bit
 LONGER = 1.0  # a rerun may outlast its log by this time [s]
 LONGEST = 60  # characters of a value in a message
 UNSTEADY = "the planner gives another plan for the same seed; draw random numbers from rng only"

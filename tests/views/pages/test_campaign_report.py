@@ -13,6 +13,7 @@ from antdrive.views.colour_vision import luminance
 from antdrive.views.colours import label_styles
 from antdrive.views.pages.campaign_summary import summarise
 from antdrive.views.pages.charts import campaign_charts, write_charts
+from antdrive.views.pages.rendering import Quantity
 from antdrive.views.pages.report import Report, report_data
 from tests.runs.made_up_campaign import Skill, made_up_columns
 from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
@@ -158,9 +159,10 @@ def test_the_data_come_back_as_they_are(columns, summary, tmp_path):
         if column is None:
             assert all(value is None for value in values)
         elif "numbers" in column:
+            factor = Quantity.of(name).factor
             for shown, value in zip(column["numbers"], values, strict=True):
                 assert (shown is None) == (value is None)
-                assert value is None or shown == pytest.approx(value, rel=1e-5)
+                assert value is None or shown == pytest.approx(factor * value, rel=1e-5)
         else:
             places = column.get("places", range(len(values)))
             shown = [None if place < 0 else column["texts"][place] for place in places]

@@ -6,9 +6,10 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 from antdrive.base.errors import InputError
+from antdrive.base.progress import bar
 from antdrive.base.version import require_physics
 from antdrive.cli import options
-from antdrive.cli.console import bar, print_error, show
+from antdrive.cli.console import print_error, show
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults
 from antdrive.sim.settings import SETTINGS

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast, get_args
 
 from antdrive.base.errors import InputError
+from antdrive.base.progress import bar
 from antdrive.base.tables import marked
 from antdrive.cli import options
-from antdrive.cli.console import bar, print_error, print_line, show
+from antdrive.cli.console import print_error, print_line, show
 from antdrive.cli.exits import FAILED, INTERNAL_ERROR, INVALID_INPUT, SUCCEEDED
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.scenario_options import with_calibrated_margin

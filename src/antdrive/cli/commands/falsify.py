@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from antdrive.base.files import file_name
+from antdrive.base.progress import bar
 from antdrive.cli import options
-from antdrive.cli.console import bar, show
+from antdrive.cli.console import show
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, results_folder
 from antdrive.cli.scenario_options import Setup

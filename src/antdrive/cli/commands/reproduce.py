@@ -4,10 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from antdrive.base.files import write_json
+from antdrive.base.progress import bar
 from antdrive.base.tables import file_lines, table
 from antdrive.base.version import require_physics
 from antdrive.cli import options
-from antdrive.cli.console import bar, print_error, show
+from antdrive.cli.console import print_error, show
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import results_folder
 from antdrive.views.run_folder import suffixes

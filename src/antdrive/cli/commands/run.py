@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from antdrive.base.atomic import folder_lock
-from antdrive.base.progress import shown_progress
+from antdrive.base.progress import bar, shown_progress
 from antdrive.base.tables import file_lines, marked
 from antdrive.cli import options
-from antdrive.cli.console import bar, planning, show, this_command
+from antdrive.cli.console import planning, show, this_command
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, print_idle_settings
 from antdrive.cli.scenario_options import Ends, Setup

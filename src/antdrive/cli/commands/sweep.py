@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
+from antdrive.base.progress import bar
 from antdrive.cli import options
-from antdrive.cli.console import bar, print_error, show
+from antdrive.cli.console import print_error, show
 from antdrive.cli.exits import SUCCEEDED
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults

@@ -1,7 +1,8 @@
 """`antdrive warm`."""
 
+from antdrive.base.progress import bar
 from antdrive.cli import options
-from antdrive.cli.console import bar, print_line
+from antdrive.cli.console import print_line
 
 
 def warm(jobs: options.Jobs = None) -> None:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from antdrive.base.checks import pair
 from antdrive.base.errors import InputError
 from antdrive.base.files import summary_of
-from antdrive.base.progress import shown_progress
+from antdrive.base.progress import bar, shown_progress
 from antdrive.base.tables import file_lines
 from antdrive.cli import options
-from antdrive.cli.console import bar, show
+from antdrive.cli.console import show
 from antdrive.cli.listings import Row, world_lines
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import import_target, numbers, pose

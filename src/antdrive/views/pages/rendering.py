@@ -166,16 +166,12 @@ def script_json(value: Any) -> str:
 
 
 def json_column(name: str, values: Sequence[Any]) -> dict[str, Any] | None:
-    """Return a column as numbers or texts; None if it is empty."""
+    """Return a column as numbers in the unit of its heading, or as texts; None if it is empty."""
     if all(value is None for value in values):
         return None
     if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
         factor = Quantity.of(name).factor
-        return {
-            "name": name,
-            "numbers": [_number(value) for value in values],
-            **({} if factor == 1 else {"factor": factor}),
-        }
+        return {"name": name, "numbers": [_number(value, factor) for value in values]}
     return {"name": name, **json_texts([None if value is None else str(value) for value in values])}
 
 
@@ -188,12 +184,12 @@ def json_texts(given: Sequence[str | None]) -> dict[str, Any]:
     return {"texts": list(different), "places": [-1 if value is None else different[value] for value in values]}
 
 
-def _number(value: Any) -> float | int | None:
+def _number(value: Any, factor: float) -> float | int | None:
     if value is None or not math.isfinite(value):
         return None
-    if isinstance(value, int):
+    if isinstance(value, int) and factor == 1:
         return value
-    rounded = float(f"{value:.{SIGNIFICANT}g}")
+    rounded = float(f"{factor * value:.{SIGNIFICANT}g}")
     return int(rounded) if rounded.is_integer() and abs(rounded) < 1e15 else rounded
 
 
