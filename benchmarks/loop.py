@@ -29,8 +29,8 @@ import numpy as np
 
 from antdrive.robots import Avoidance, PurePursuit, TrackedPath, load_robot
 from antdrive.sim import Perception, Scenario, run
-from antdrive.sim.driving import drive
-from antdrive.sim.driving.drive import OnePath, follow
+from antdrive.sim.driving.body import Body
+from antdrive.sim.driving.drive import Driver, OnePath, follow
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.perceived_movers import GroundTruth
 from antdrive.sim.driving.plants import Bullet
@@ -147,7 +147,14 @@ class Costs:
 
     def __init__(self) -> None:
         self.reset()
-        parts = ((drive, "_control_period"), (Bullet, "advance"), (Replanning, "replan"), (Exploration, "replan"))
+        parts = (
+            (Body, "observe"),
+            (Driver, "act"),
+            (Body, "step"),
+            (Bullet, "advance"),
+            (Replanning, "replan"),
+            (Exploration, "replan"),
+        )
         for owner, name in parts:
             setattr(owner, name, self._measured(getattr(owner, name), name))
 
@@ -169,9 +176,9 @@ class Costs:
     def each(self) -> tuple[float, float, float]:
         """Return the costs of a control period without the other two, of a physics step and of a replan [us]."""
         spent, calls = self._spent, self._calls
-        period = spent["_control_period"] - spent["advance"] - spent["replan"]
+        period = spent["observe"] + spent["act"] + spent["step"] - spent["advance"] - spent["replan"]
         physics, replans = spent["advance"] / (4 * calls["advance"]), spent["replan"] / max(calls["replan"], 1)
-        return 1e6 * period / calls["_control_period"], 1e6 * physics, 1e6 * replans
+        return 1e6 * period / calls["act"], 1e6 * physics, 1e6 * replans
 
 
 def table_of_crowds(rounds: int, most: int) -> None:

@@ -12,7 +12,8 @@ from typing import NamedTuple
 from antdrive.robots import LIMITERS, Avoidance
 from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
-from antdrive.sim.driving.drive import full_turn, no_scan
+from antdrive.sim.driving.body import no_scan
+from antdrive.sim.driving.drive import full_turn
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import localiser_of

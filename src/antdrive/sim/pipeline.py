@@ -12,6 +12,7 @@ from antdrive.base.progress import progress_bar
 from antdrive.base.version import require_physics
 from antdrive.planners import PlanResult, PlanStatus
 from antdrive.sim.compose import compose
+from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.facts import LoggedRun, result_of
@@ -179,6 +180,6 @@ def driven(
     driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz)
     with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories) as engine:
         plant = Bullet(engine, s.task.start, s.control_hz)
-        ending = drive(plant, driver, parts.localiser, parts.scan, hz=s.control_hz, limit=limit, progress=progress)
-        log = plant.finish(ending)
+        body = Body(plant, parts.localiser, parts.scan, hz=s.control_hz, limit=limit, task=s.task)
+        log = plant.finish(drive(body, driver, progress))
     return grid, answer, rollout_of(s, parts, grid, answer, route, log, limit, time.perf_counter() - started)

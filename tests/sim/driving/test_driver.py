@@ -18,9 +18,10 @@ from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, Pu
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
 from antdrive.sim.driving.blockage import blocked_cells, covered_discs
+from antdrive.sim.driving.body import SILENT, Body, Note, Observation
 from antdrive.sim.driving.drive import STUCK_PROGRESS, STUCK_TIME, Driver, OnePath, StuckClock, drive, follow, full_turn
 from antdrive.sim.driving.localising import Exact, TruePose
-from antdrive.sim.driving.parts import Decider, Ending, Guide, Moment, Step
+from antdrive.sim.driving.parts import Ending, Guide, Moment, Step
 from antdrive.sim.driving.perceived_movers import GroundTruth
 from antdrive.sim.driving.plants import Bullet, Kinematic
 from antdrive.sim.driving.rules import (
@@ -37,7 +38,7 @@ from antdrive.sim.driving.rules import (
     stopping_time,
 )
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.physics.engine import Engine, State
+from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, rasterise
 from tests.records import changed
 
@@ -59,9 +60,17 @@ def driver(robot, guide=None, *rules):
     return Driver(guide or OnePath(), (pursuit, *rules), tracked, TASK, robot, 60)
 
 
-def end_of(robot, tick, pose, state):
-    """How a control period ends the drive of a robot at an estimated pose; None if it goes on."""
-    return robot.arrives(tick, pose, state) or robot.decide(tick, pose, state)
+def seen(tick=0, pose=TASK.start, speed=0.0):
+    """What a robot without errors observes."""
+    return Observation(tick, pose, pose, Twist(speed, 0.0))
+
+
+def standing(true, believed=None, periods=9):
+    """The body of a robot that stands at a true position and believes to be elsewhere."""
+    exact = Exact()
+    exact.sense = lambda state: (*(believed or true), 0.0)
+    plant = Kinematic((*true, 0.0), lambda pose, twist: np.array([pose]))
+    return Body(plant, exact, hz=60, limit=periods / 60, task=TASK)
 
 
 def at(driving, arc):
@@ -103,9 +112,7 @@ def test_the_reason_names_the_stopping_constraint_where_it_held_the_robot_for_mo
 def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot):
     still = driver(turtlebot)
     ticks = 0
-    rest = State(*TASK.start, 0.0, 0.0)
-    while still.gives_up(rest) is None:
-        assert still.decide(ticks, TASK.start, rest) is None
+    while still.act(seen(ticks))[1].ending is None:
         ticks += 1
     assert ticks == pytest.approx(STUCK_TIME * 60, abs=2)
 
@@ -142,12 +149,12 @@ def test_progress_is_a_fraction_of_the_route(turtlebot):
 
 
 def test_turns_on_the_spot_add_the_time_of_a_full_turn_to_the_stuck_time(turtlebot):
-    turning, rest = driver(turtlebot), State(*TASK.start, 0.0, 0.0)
+    turning = driver(turtlebot)
     whole = full_turn(turtlebot, 60)
     assert whole == round(2 * math.pi / 3.14 * 60)
     for turned, gives_up in ((STUCK_TIME * 60 + whole - 1, False), (STUCK_TIME * 60 + whole, True)):
         turning._clock = StuckClock(turning=int(turned))
-        assert (turning.gives_up(rest) is not None) == gives_up
+        assert (turning._gives_up() is not None) == gives_up
 
 
 def test_only_a_robot_that_did_not_get_there_reports_what_its_guide_noted(turtlebot):
@@ -178,9 +185,7 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
     for distance, outcome in ((0.0, Outcome.SUCCEEDED), (0.3, Outcome.STUCK)):
         at_end = driver(turtlebot)
         at(at_end, at_end.path.length)
-        ending = None
-        for tick in range(9):  # the command comes to rest first
-            ending = ending or end_of(at_end, tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))
+        ending = drive(standing((x, y - distance), (x, y)), at_end)  # the command comes to rest first
         assert ending.outcome is outcome
         lost = (
             "the robot believed that it was at the goal, 0.00 m from it, but was 0.300 m from it "
@@ -192,8 +197,9 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
 def test_a_robot_that_knows_where_it_is_is_told_how_far_from_the_goal_its_route_ends(turtlebot):
     x, y = TASK.goal
     for off in (-0.3, 0.4):  # what it believes lies outside the tolerance, too
-        ending = driver(turtlebot)._arrival((x, y + off, 0.0), State(x, y - 0.3, 0.0, 0.0, 0.0))
-        assert ending.reason == "the route ends here, 0.300 m from the goal; the tolerance is 0.25 m"
+        body = standing((x, y - 0.3), (x, y + off))
+        body.step(None)
+        assert body.ended.reason == "the route ends here, 0.300 m from the goal; the tolerance is 0.25 m"
 
 
 def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_holds_its_speed(turtlebot):
@@ -205,11 +211,10 @@ def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_ho
     sight = StoppingConstraint(None, turtlebot, 60, 0.1, lambda *_: None)
     sight.limit = lambda *_: (Twist(0.005, 0.0), True)
     robot = driver(turtlebot, None, Avoid(calm, nobody, OnePath(), TASK, turtlebot, 60), sight)
-    at_goal = (*TASK.goal, 0.0)
-    at(robot, robot.path.length - 0.5)
-    endings = [end_of(robot, tick, at_goal, State(*at_goal, 0.0, 0.0)) for tick in range(2)]
+    body = standing(TASK.goal)
+    assert drive(body, at(robot, robot.path.length - 0.5)).outcome is Outcome.SUCCEEDED
     assert robot.step.pursuit.limiter != LIMITERS.index("avoid")
-    assert [ending and ending.outcome for ending in endings] == [None, Outcome.SUCCEEDED]
+    assert body.tick == 1
 
 
 def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, turtlebot, monkeypatch):
@@ -227,8 +232,7 @@ def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, tu
         noted = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
         monkeypatch.setattr("antdrive.sim.compose.avoidance_of", lambda _, noted=noted: noted)
         rule = next(rule for rule in compose(unknown).rules if type(rule) is Avoid)
-        still = State(*TASK.start, 0.0, 0.0)
-        rule.apply(Moment(0, TASK.start, still, driver(robot).path, Step(), StuckClock()), Step())
+        rule.apply(Moment(0, TASK.start, driver(robot).path, Step(), StuckClock()), Step())
         slow = robot is jackal and perception.kind == "lidar"
         assert asked == [BLIND_SHARE * robot.max_speed if slow else math.inf]
 
@@ -250,19 +254,18 @@ def test_a_replan_starts_its_route_from_the_beginning(turtlebot):
     monitor = OneReplan()
     robot = driver(turtlebot, monitor)
     monitor.path = driver(turtlebot).path
-    robot.decide(0, (3.0, 3.0, 0.0), State(3.0, 3.0, 0.0, 0.5, 0.0))
+    robot.act(seen(0, (3.0, 3.0, 0.0), 0.5))
     old = robot.path
     assert robot.step.pursuit.arc > 0
-    robot.decide(1, TASK.start, State(*TASK.start, 0.5, 0.0))
+    robot.act(seen(1, speed=0.5))
     assert robot.path is monitor.path is not old
     assert robot.step.pursuit.arc == pytest.approx(0.0, abs=0.02)
 
 
 def test_the_first_command_accelerates_within_the_robots_limit(turtlebot):
     first = driver(turtlebot)
-    first.decide(0, TASK.start, State(*TASK.start, 0.0, 0.0))
-    assert Twist(0.0, 0.0) != first.step.command
-    assert 0 < first.step.command.speed <= turtlebot.max_acceleration / 60 + 1e-12
+    command, _ = first.act(seen())
+    assert 0 < command.speed <= turtlebot.max_acceleration / 60 + 1e-12
 
 
 @given(st.lists(st.tuples(st.floats(0.5, 8.5), st.floats(0.5, 5.5), st.floats(0.05, 1.0)), max_size=5))
@@ -343,11 +346,8 @@ def test_a_robot_that_gives_way_is_not_stuck(turtlebot):
         avoid=lambda *_, **__: (Twist(0.0, 0.0), True, AvoidanceState()),
     )
     waits = driver(turtlebot, None, Avoid(cautious, nobody, OnePath(), TASK, turtlebot, 60))
-    rest = State(*TASK.start, 0.0, 0.0)
     for tick in range(round(STUCK_TIME * 60) + 20):
-        assert waits.decide(tick, TASK.start, rest) is None
-    assert waits.step.pursuit.limiter == AVOIDING
-    assert waits.gives_up(rest) is None
+        assert waits.act(seen(tick)) == ((0.0, 0.0), Note(AVOIDING))
 
 
 class Watcher(Guide):
@@ -379,18 +379,21 @@ def test_a_robot_waits_if_it_stands_to_give_way(turtlebot, avoids, speed, waits)
     monitor = Watcher()
     robot = driver(turtlebot, monitor)
     robot.step = Step(avoids=avoids)
-    robot.decide(0, TASK.start, State(*TASK.start, speed, 0.0))
+    robot.act(seen(speed=speed))
     assert monitor.waiting == [waits]
 
 
-class EndsAt(Decider):
-    """Decides in one control period that it is stuck, and notes for which period the reason is asked."""
+class EndsAt:
+    """Gives up in one control period, and notes for which period the reason is asked."""
 
-    def __init__(self, tick):
-        self.step, self._tick, self.asked = Step(), tick, []
+    progress_periods, fraction = 6, 0.0
 
-    def decide(self, tick, pose, state):
-        return Ending(Outcome.STUCK) if tick == self._tick else None
+    def __init__(self, tick, command):
+        self._tick, self._command, self.asked = tick, command, []
+
+    def act(self, now):
+        ends = now.tick == self._tick
+        return (self._command, Note(ending=Ending(Outcome.STUCK))) if ends else (Twist(0.0, 0.0), SILENT)
 
     def with_reason(self, ending, tick):
         self.asked.append((ending.outcome, tick))
@@ -399,10 +402,12 @@ class EndsAt(Decider):
 
 def test_the_reason_is_that_of_the_period_in_which_the_drive_ends():
     for last, outcome, asked in ((3, Outcome.STUCK, 3), (0, Outcome.STUCK, 0), (99, Outcome.TIMED_OUT, 30)):
-        plant = Kinematic(TASK.start, lambda pose, twist: np.array([pose]))
-        decider = EndsAt(last)
-        assert drive(plant, decider, Exact(), hz=60, limit=0.5).outcome is outcome
-        assert decider.asked == [(outcome, asked)]
+        for command, steps in ((None, asked), (Twist(0.0, 0.0), min(asked + 1, 30))):
+            plant = Kinematic(TASK.start, lambda pose, twist: np.array([pose]))
+            mind = EndsAt(last, command)
+            assert drive(Body(plant, Exact(), hz=60, limit=0.5), mind).outcome is outcome
+            assert mind.asked == [(outcome, asked)]
+            assert len(plant.poses) == 1 + steps
 
 
 @pytest.mark.parametrize(("true", "outcome"), [(0.4, Outcome.STUCK), (0.1, Outcome.SUCCEEDED)])
@@ -410,13 +415,26 @@ def test_the_reason_is_that_of_the_period_in_which_the_drive_ends():
 def test_a_goal_missed_by_the_estimate_triggers_a_replan(turtlebot, off, knows, true, outcome):
     """It stands `true` from the goal, and estimates that it is `off` from it. What is true ends no drive for it."""
     monitor, (x, y) = Watcher(), TASK.goal
-    robot = driver(turtlebot, monitor)
-    endings = []
-    for tick in range(9):  # the command comes to rest first
+    robot, body = driver(turtlebot, monitor), standing((x - true, y), (x - off, y))
+    while body.ended is None:  # the command comes to rest first
         robot.step = robot.step._replace(pursuit=PursuitState(arc=robot.path.length))
-        endings.append(end_of(robot, tick, (x - off, y, 0.0), State(x - true, y, 0.0, 0.0, 0.0)))
+        body.step(*robot.act(body.observe()))
     assert bool(monitor.misses) is knows
-    assert any(ending is not None and ending.outcome is outcome for ending in endings) is not knows
+    assert body.ended.outcome is (Outcome.TIMED_OUT if knows else outcome)
+
+
+def test_a_robot_that_stands_at_the_goal_has_arrived_whatever_it_commands():
+    """It is observed once in a period. Before its first command it has not arrived."""
+    plant, asked = Kinematic((*TASK.goal, 0.0), lambda pose, twist: np.array([pose])), []
+    exact = Exact()
+    exact.sense = lambda state: asked.append(state) or state.pose
+    body = Body(plant, exact, hz=60, limit=1.0, task=TASK)
+    for _ in range(2):
+        assert body.ended is None
+        assert body.observe() is body.observe()
+        body.step(Twist(0.0, 0.0))
+    assert body.ended == (Outcome.SUCCEEDED, "")
+    assert (body.tick, len(asked), len(plant.poses)) == (1, 2, 2)
 
 
 def test_a_path_is_followed_by_the_estimates_of_the_localiser(turtlebot):
@@ -444,7 +462,7 @@ def test_the_first_row_is_at_rest_and_estimates_keep_their_error(turtlebot):
         x, y, yaw = plant.state.pose
         localiser = TruePose(turtlebot.noise, turtlebot.track, 1 / 80, TASK.start, np.random.default_rng(0))
         localiser.settle((x + 0.1, y - 0.2, yaw + 0.3 + 2 * np.pi))
-        plant.advance(Step(Twist(0.2, 0.1), PursuitState(limiter=2)), Twist(0.3, 0.4))
+        plant.advance(Twist(0.2, 0.1), Twist(0.3, 0.4), 2)
         found = plant.finish(Ending(Outcome.TIMED_OUT))
         logged = localiser.logged(found, plant.per_tick)
     np.testing.assert_array_equal(found.command, [(0.0, 0.0), *[(0.2, 0.1)] * 3])

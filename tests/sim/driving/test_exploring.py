@@ -16,6 +16,7 @@ from antdrive.robots.default_margin import SQUEEZED, TURNABLE
 from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, check, near_polyline, point_at, surrounding
+from antdrive.sim.driving.body import Observation
 from antdrive.sim.driving.drive import Driver
 from antdrive.sim.driving.exploring import INTERVAL
 from antdrive.sim.driving.parts import Step
@@ -25,7 +26,6 @@ from antdrive.sim.driving.routes import RoutePlanner, bounds_of
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverTracking, SimulatedLidar, Survey, reset_ticks
 from antdrive.sim.log.record import ReplanRecord
-from antdrive.sim.physics.engine import State
 from antdrive.sim.policy import SCANNED, STALLED, Perception
 from antdrive.sim.recorded import rebuilt
 from antdrive.sim.sensing import Scanner
@@ -572,8 +572,9 @@ def test_a_robot_without_a_path_at_the_end_of_its_route_keeps_searching_for_a_wh
     exploration.replan = lambda tick, pose, trigger: asked.append(trigger)
     exploration.lost = lost
     robot.step = Step(pursuit=PursuitState(arc=tracked.length))
-    ending = robot._end_of_route(0, HERE, State(*HERE, 0.0, 0.0), Twist(0.0, 0.0))
-    assert (ending is None) == lost
+    exploration.trigger = lambda *_: ""
+    command, _ = robot.act(Observation(0, HERE, HERE, Twist(0.0, 0.0)))
+    assert (command is not None) == lost
     assert asked == ([] if lost else ["missed the goal"])
 
 

@@ -19,17 +19,15 @@ from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import PlannerError
-from antdrive.robots import PurePursuit, TrackedPath, Twist, footprint_clearance
+from antdrive.robots import PursuitState, Twist, footprint_clearance
 from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.sim.compose import route_planner
-from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.localising import localiser_of
-from antdrive.sim.driving.parts import Decider, Ending, Step
 from antdrive.sim.driving.plants import Kinematic
 from antdrive.sim.driving.routes import OneRoute
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.physics.engine import State
 from antdrive.sim.pipeline import plan
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Disc, Task, World
@@ -152,25 +150,13 @@ def rehearsed_clearance(s: Scenario) -> float:
     localiser = localiser_of("fixes", s.robot, s.noise, 1.0, 1 / s.control_hz, s.task.start, s.seed)
     plant = Kinematic(s.task.start, lambda pose, twist: np.array([_moved(pose, twist, 1 / s.control_hz)]))
     limit = SETTLING + PATIENCE * route.length / s.robot.max_speed
-    drive(plant, Rehearsing(path, s.controller), localiser, hz=s.control_hz, limit=limit)
+    body, command, state = Body(plant, localiser, hz=s.control_hz, limit=limit), Twist(0.0, 0.0), PursuitState()
+    while body.ended is None and not (
+        state.arc > path.length - path.goal_distance and abs(plant.state.speed) < STANDING
+    ):
+        command, state = s.controller.step(path, body.observe().pose, command, state)
+        body.step(command)
     return float(footprint_clearance(s.driven_world, s.robot.footprint, plant.poses).min())
-
-
-class Rehearsing(Decider):
-    """Decider that follows a path with the controller alone until the robot stands at its end."""
-
-    def __init__(self, path: TrackedPath, controller: PurePursuit) -> None:
-        self.step = Step()
-        self._path, self._controller = path, controller
-
-    def decide(self, tick: int, pose: Pose, state: State) -> None:
-        """Set the controller's command."""
-        self.step = Step(*self._controller.step(self._path, pose, self.step.command, self.step.pursuit))
-
-    def gives_up(self, state: State) -> Ending | None:
-        """End the drive if the robot stands at the end of the path."""
-        there = self.step.pursuit.arc > self._path.length - self._path.goal_distance
-        return Ending(Outcome.SUCCEEDED) if there and abs(state.speed) < STANDING else None
 
 
 def _moved(pose: Pose, twist: Twist, time: float) -> Pose:

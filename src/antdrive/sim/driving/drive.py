@@ -1,4 +1,4 @@
-"""Drive loop and driver: follow the guide, apply the rules, detect arrival and failure."""
+"""Driver and drive loop: follow the guide, apply the rules, arrive or give up."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 from antdrive.base import Pose
 from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, Twist
+from antdrive.sim.driving.body import SILENT, Body, Note, Observation
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import Decider, Ending, Guide, Localiser, Moment, Plant, Rule, Scanning, Step
+from antdrive.sim.driving.parts import Ending, Guide, Localiser, Moment, Rule, Step
 from antdrive.sim.driving.plants import Bullet, Drive
 from antdrive.sim.driving.rules import SIGHT_LIMIT, WAITING_SPEED, Pursuit
-from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME, arrived, control_periods, outcome_at, stopped
+from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME, arrived, stopped
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.physics.engine import Engine, State
+from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Task
 
 PROGRESS_HZ = 10  # calls of `progress` per simulated second
@@ -24,47 +25,6 @@ Progress = Callable[[float], None]
 
 def ignore_progress(fraction: float) -> None:
     """Ignore the progress of a drive."""
-
-
-def no_scan(tick: int, pose: Pose, estimate: Pose) -> Pose:
-    """Return the estimate unchanged, for a robot without scans."""
-    return estimate
-
-
-def drive(
-    plant: Plant,
-    decider: Decider,
-    localiser: Localiser,
-    scan: Scanning = no_scan,
-    *,
-    hz: int,  # control periods per second
-    limit: float,  # time limit [s]
-    progress: Progress = ignore_progress,
-) -> Ending:
-    """Drive until the decider ends the drive, the robot touches something, or the time limit passes."""
-    if plant.touched:
-        return Ending(Outcome.COLLIDED)
-    periods = control_periods(limit, hz)
-    for tick in range(periods):
-        ending = _control_period(tick, plant, decider, localiser, scan)
-        if tick % (hz // PROGRESS_HZ or 1) == 0:
-            progress(decider.fraction)
-        if ending:
-            return decider.with_reason(ending, tick)
-    return decider.with_reason(Ending(Outcome.TIMED_OUT), periods)
-
-
-def _control_period(tick: int, plant: Plant, decider: Decider, localiser: Localiser, scan: Scanning) -> Ending | None:
-    """Run one control period: sense, decide, act. Return the ending, or None while the drive continues."""
-    state = plant.state
-    estimate = scan(tick, state.pose, localiser.sense(state))
-    pose = localiser.settle(estimate)
-    ending = decider.arrives(tick, estimate, state) or decider.decide(tick, pose, state)
-    if ending:
-        return ending
-    step = decider.step
-    plant.advance(step, localiser.actuate(step.command))
-    return Ending(Outcome.COLLIDED) if plant.touched else decider.gives_up(plant.state)
 
 
 class StuckClock(NamedTuple):
@@ -95,12 +55,13 @@ class StuckClock(NamedTuple):
         return why
 
 
-class Driver(Decider):
-    """Decider that drives a robot along a path, one step per control period.
+class Driver:
+    """Mind that drives a robot along a path, one step per control period.
 
     Attributes:
         path: the current path
         step: the current step
+        progress_periods: control periods between two reports of progress
     """
 
     def __init__(
@@ -111,39 +72,39 @@ class Driver(Decider):
         self._clock = StuckClock()
         self._patience = round(STUCK_TIME * hz)
         self._full_turn = full_turn(robot, hz)
+        self.progress_periods = hz // PROGRESS_HZ or 1
 
     @property
     def fraction(self) -> float:
         """Completed fraction of the route."""
         return self.step.pursuit.arc / self.path.length
 
-    def arrives(self, tick: int, estimate: Pose, state: State) -> Ending | None:
-        """End the drive of a robot that stands at the goal, once it has had a command."""
-        task = self._task
-        at_goal = tick > 0 and arrived(estimate, state[3:], self.step.command, task.goal, task.goal_tolerance)
-        return self._arrival(estimate, state) if at_goal else None
-
-    def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
-        """Choose the step of one control period, or end the drive."""
-        guide, before = self._guide, self.step
-        waiting = before.avoids and abs(state.speed) < WAITING_SPEED
-        trigger = guide.trigger(tick, pose, waiting, self.path, before.pursuit.arc)
+    def act(self, now: Observation) -> tuple[Twist | None, Note]:
+        """Return the command of one control period, None to stay where the robot stands, and a note on it."""
+        guide, task, before, pose = self._guide, self._task, self.step, now.pose
+        if now.tick and arrived(now.estimate, now.twist, before.command, task.goal, task.goal_tolerance):
+            return None, SILENT
+        waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
+        trigger = guide.trigger(now.tick, pose, waiting, self.path, before.pursuit.arc)
         if trigger:
-            self._follow(guide.replan(tick, pose, trigger))
+            self._follow(guide.replan(now.tick, pose, trigger))
         if guide.plan_error:
-            return self._invalid_plan(tick)
+            return None, self._invalid_plan(now.tick)
         if guide.blocked:
-            return Ending(Outcome.BLOCKED, guide.blocked)
+            return None, Note(ending=Ending(Outcome.BLOCKED, guide.blocked))
         self.path = guide.refreshed(self.path, pose)
-        now, step = Moment(tick, pose, state, self.path, self.step, self._clock), self.step
+        moment, step = Moment(now.tick, pose, self.path, self.step, self._clock), self.step
         for rule in self._rules:
-            step = rule.apply(now, step)
+            step = rule.apply(moment, step)
         self.step = step
-        ending = self._end_of_route(tick, pose, state, before.command)
+        if self._at_end_of_route(pose, now.twist, before.command) and not (
+            self._follow(guide.missed(now.tick, pose)) or guide.may_wait
+        ):
+            return None, self._invalid_plan(now.tick) if guide.plan_error else SILENT
         self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scan_turning)
-        return ending
+        return step.command, Note(step.pursuit.limiter, self._gives_up())
 
-    def gives_up(self, state: State) -> Ending | None:
+    def _gives_up(self) -> Ending | None:
         """End the drive of a robot without progress. Turning on the spot adds the time of a full turn to the limit."""
         clock = self._clock
         if clock.driving < self._patience and clock.turning < self._patience + self._full_turn:
@@ -165,36 +126,27 @@ class Driver(Decider):
         self._clock = self._clock._replace(farthest=0.0)
         return True
 
-    def _end_of_route(self, tick: int, pose: Pose, state: State, last: Twist) -> Ending | None:
-        """End the drive of a robot that stands at the end of its route, unless it can still reach the goal."""
-        path, (command, pursuit, *_) = self.path, self.step
-        if path.length - pursuit.arc > path.goal_distance or any(command) or not stopped(state[3:], last):
-            return None
-        ending, guide, task = self._arrival(pose, state), self._guide, self._task
-        if math.dist(pose[:2], task.goal) <= task.goal_tolerance:
-            return None  # the robot stays, and has arrived in the next control period
-        if self._follow(guide.missed(tick, pose)) or guide.may_wait:
-            return None
-        return self._invalid_plan(tick) if guide.plan_error else ending
+    def _at_end_of_route(self, pose: Pose, twist: Twist, last: Twist) -> bool:
+        """Return whether the robot stands at the end of its route, and not at the goal, where it arrives in the next period."""
+        path, (command, pursuit, *_), task = self.path, self.step, self._task
+        if path.length - pursuit.arc > path.goal_distance or any(command) or not stopped(twist, last):
+            return False
+        return math.dist(pose[:2], task.goal) > task.goal_tolerance
 
-    def _invalid_plan(self, tick: int) -> Ending:
-        """Return the ending after an invalid plan."""
-        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.plan_error}")
+    def _invalid_plan(self, tick: int) -> Note:
+        """Return the note on an invalid plan, which ends the drive."""
+        reason = f"on the way, at t = {tick / self._hz:g} s: {self._guide.plan_error}"
+        return Note(ending=Ending(Outcome.INVALID_PLAN, reason))
 
-    def _arrival(self, pose: Pose, state: State) -> Ending:
-        """Return the ending of a robot that stops at an estimated pose without contact."""
-        task, true = self._task, (state.x, state.y)
-        left, believed = math.dist(true, task.goal), math.dist(pose[:2], task.goal)
-        outcome = outcome_at(true, task.goal, task.goal_tolerance)
-        if outcome is Outcome.SUCCEEDED:
-            return Ending(outcome)
-        why = f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
-        if believed <= task.goal_tolerance:
-            why = (
-                f"the robot believed that it was at the goal, {believed:.2f} m from it, but was {left:.3f} m from it "
-                f"(the tolerance is {task.goal_tolerance:g} m): its estimate was wrong by {math.dist(pose[:2], true):.2f} m"
-            )
-        return Ending(outcome, why)
+
+def drive(body: Body, driver: Driver, progress: Progress = ignore_progress) -> Ending:
+    """Drive until the driver gives up or has arrived, the robot touches something, or the time limit passes."""
+    while body.ended is None:
+        now = body.observe()
+        body.step(*driver.act(now))
+        if now.tick % driver.progress_periods == 0:
+            progress(driver.fraction)
+    return driver.with_reason(body.ended, body.tick)
 
 
 def full_turn(robot: RobotSpec, hz: int) -> int:
@@ -225,5 +177,5 @@ def follow(
     pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))
     driver = Driver(OnePath(), (pursuit, *rules), path, task, engine.robot, control_hz)
     plant = Bullet(engine, task.start, control_hz)
-    ending = drive(plant, driver, localiser or Exact(), hz=control_hz, limit=limit, progress=progress)
-    return plant.finish(ending)
+    body = Body(plant, localiser or Exact(), hz=control_hz, limit=limit, task=task)
+    return plant.finish(drive(body, driver, progress))

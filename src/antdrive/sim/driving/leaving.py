@@ -7,14 +7,11 @@ import math
 import numpy as np
 
 from antdrive.base import Floats, Pose
-from antdrive.robots import PurePursuit, RobotSpec, TrackedPath, Twist, footprint_clearance
+from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, Twist, footprint_clearance
 from antdrive.robots.clearance import footprint_distances, obstacle_name
-from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import Decider, Ending, Step
 from antdrive.sim.driving.plants import Kinematic
-from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.physics.engine import State
 from antdrive.worlds import World, point_clearance
 
 REHEARSED = 60.0  # limit of the rehearsal; the drive decides what follows [s]
@@ -35,48 +32,50 @@ def cannot_leave(
     route that the controller takes counts. The robot turns the shorter way round. If that is blocked, a robot not
     centred on its axle turns the other way.
     """
-    if robot.footprint.corners:
-        halting = Leaving(tracked, controller, world, robot, halts=True)
-        if _rehearsed(halting, world, robot, start, control_hz)[0].outcome is Outcome.SUCCEEDED:
-            return ""
-    leaving = Leaving(tracked.ignoring_turn_clearance, controller, world, robot)
-    ending, plant = _rehearsed(leaving, world, robot, start, control_hz)
-    if ending.outcome is not Outcome.COLLIDED:
+    if robot.footprint.corners and not _rehearsed(tracked, controller, world, robot, start, control_hz, halts=True):
         return ""
+    stopped = _rehearsed(tracked.ignoring_turn_clearance, controller, world, robot, start, control_hz)
+    if stopped is None or not stopped[0].touched:
+        return ""
+    plant, turning = stopped
     touching = footprint_clearance(world, robot.footprint, plant.way) <= 0
     gap = footprint_distances(world, robot, plant.way[touching][:1])[0]
-    does = "turning on the spot" if leaving.step.pursuit.turning else "driving off"
+    does = "turning on the spot" if turning else "driving off"
     return (
         f"{does} at the start would bring {robot.name} into {obstacle_name(world, int(gap.argmin()))}; "
         f"a free turn needs {robot.radius:.3f} m around its centre, the start has {_room(world, start):.3f} m"
     )
 
 
-class Leaving(Decider):
-    """Decider that follows a path until the robot can turn freely; with `halts`, a stop by the controller ends it."""
+def _rehearsed(
+    path: TrackedPath,
+    controller: PurePursuit,
+    world: World,
+    robot: RobotSpec,
+    start: Pose,
+    hz: int,
+    *,
+    halts: bool = False,
+) -> tuple[Kinematic, bool] | None:
+    """Follow a path until the robot can turn freely, and return None; else where it ended, and whether it turned.
 
-    def __init__(
-        self, path: TrackedPath, controller: PurePursuit, world: World, robot: RobotSpec, *, halts: bool = False
-    ) -> None:
-        self.step = Step()
-        self._path, self._controller, self._world, self._robot, self._halts = path, controller, world, robot, halts
-
-    def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
-        """Return the controller's command while the place is narrow."""
-        if not is_narrow(self._world, self._robot, pose):
-            return Ending(Outcome.SUCCEEDED)
-        self.step = Step(*self._controller.step(self._path, pose, self.step.command, self.step.pursuit))
-        return Ending(Outcome.STUCK) if self._halts and not any(self.step.command) else None
-
-
-def _rehearsed(leaving: Leaving, world: World, robot: RobotSpec, start: Pose, hz: int) -> tuple[Ending, Kinematic]:
-    """Rehearse the start; return the ending and the robot."""
+    With `halts`, a stop by the controller ends it, too.
+    """
     plant = Kinematic(
         start,
         lambda pose, twist: _way(pose, twist, 1 / hz, robot.radius),
         lambda way: bool((footprint_clearance(world, robot.footprint, way) <= 0).any()),
     )
-    return drive(plant, leaving, Exact(), hz=hz, limit=REHEARSED), plant
+    body, command, state = Body(plant, Exact(), hz=hz, limit=REHEARSED), Twist(0.0, 0.0), PursuitState()
+    while body.ended is None:
+        pose = body.observe().pose
+        if not is_narrow(world, robot, pose):
+            return None
+        command, state = controller.step(path, pose, command, state)
+        if halts and not any(command):
+            break
+        body.step(command)
+    return plant, state.turning
 
 
 def _room(world: World, pose: Pose) -> float:

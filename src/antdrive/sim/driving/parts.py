@@ -50,7 +50,6 @@ class Moment(NamedTuple):
 
     tick: int  # the number of the control period
     pose: Pose  # estimated pose when the command takes effect
-    state: State  # true state
     path: TrackedPath  # the current path
     before: Step  # the step of the previous control period
     clock: StuckClock  # time without progress
@@ -65,8 +64,8 @@ class Plant(Protocol):
     def touched(self) -> bool:
         """Whether the robot has touched anything so far."""
 
-    def advance(self, step: Step, actuated: Twist) -> None:
-        """Drive for one control period with the given motor targets."""
+    def advance(self, command: Twist, actuated: Twist, limiter: int = 0) -> None:
+        """Drive for one control period with the given motor targets; the command and its limiter are for the log."""
 
 
 class Rows(Protocol):
@@ -198,30 +197,3 @@ class Rule(Protocol):
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the step, modified if the rule requires it."""
-
-
-class Decider(Protocol):
-    """Source of commands: a `Driver`, a rehearsal or a log."""
-
-    step: Step  # the current step
-
-    @property
-    def fraction(self) -> float:
-        """Completed fraction of the route."""
-        return 0.0
-
-    def arrives(self, tick: int, estimate: Pose, state: State) -> Ending | None:
-        """End the drive of a robot that stands at the goal by its estimate."""
-        return None
-
-    def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
-        """Choose the step of one control period for the pose at which it takes effect, or end the drive."""
-
-    def gives_up(self, state: State) -> Ending | None:
-        """End the drive after a control period that led to a state."""
-        return None
-
-    def with_reason(self, ending: Ending, tick: int) -> Ending:
-        """Return the ending with the decider's details."""
-
-        return ending

@@ -13,7 +13,7 @@ from antdrive.base.errors import FieldError
 from antdrive.robots import Twist, footprint_clearance
 from antdrive.robots.clearance import kernel_shape
 from antdrive.sim.driving import _kernels_movers
-from antdrive.sim.driving.parts import Ending, Step
+from antdrive.sim.driving.parts import Ending
 from antdrive.sim.log.contacts import Attribution
 from antdrive.sim.log.ending import rows_after_contact
 from antdrive.sim.log.outcome import Outcome
@@ -69,10 +69,10 @@ class Bullet:
         """Whether the robot has touched anything so far."""
         return bool(self._contacts)
 
-    def advance(self, step: Step, actuated: Twist) -> None:
+    def advance(self, command: Twist, actuated: Twist, limiter: int = 0) -> None:
         """Drive for one control period."""
         self._engine.command(*actuated)
-        self._log(self.per_tick, (*step.command, step.pursuit.limiter, *actuated))
+        self._log(self.per_tick, (*command, limiter, *actuated))
 
     def play(self, targets: Floats) -> Drive:
         """Play motor targets (N, 2), one row per physics step, and return the log."""
@@ -147,7 +147,7 @@ class Kinematic:
         self.state, self.touched = State(*start, 0.0, 0.0), False
         self.way, self.poses = np.array([start]), [start]
 
-    def advance(self, step: Step, actuated: Twist) -> None:
+    def advance(self, command: Twist, actuated: Twist, limiter: int = 0) -> None:
         """Drive for one control period."""
         self.way = self._motion(self.state.pose, actuated)
         self.touched = self._touches(self.way)

@@ -21,9 +21,8 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots import Twist
-from antdrive.sim.driving.drive import drive, no_scan
+from antdrive.sim.driving.body import Body, no_scan
 from antdrive.sim.driving.localising import Exact, logged_localiser
-from antdrive.sim.driving.parts import Decider, Ending, Step
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.driving.survey import MoverTracking, Scans, SimulatedLidar, Survey, reset_ticks
 from antdrive.sim.log.outcome import Outcome
@@ -110,16 +109,21 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
     # A period's first row is the last row of the previous period; a contact ends control.
     rows = range(0, min(rollout.first_contact, len(rollout.t) - 1), per_tick)
     scans, resets = scans_of(rollout)
-    plant, reader = Logged(rollout), Reader(rollout, len(rows), resets)
-    periods = len(rows) + _decided_at_the_end(rollout, per_tick)
-    drive(
+    plant = Logged(rollout)
+    body = Body(
         plant,
-        reader,
         localiser,
         scans.scan if scans else no_scan,
         hz=record.control_hz,
-        limit=periods / record.control_hz,
+        limit=(len(rows) + 1) / record.control_hz,
     )
+    for tick, row in enumerate(rows):
+        pose = body.observe().pose
+        if tick in resets:
+            resets[tick](pose)
+        body.step(Twist(*rollout.command[row + 1].tolist()))
+    if _decided_at_the_end(rollout, per_tick):
+        body.observe()
     if scans:
         yield from _other_scans(rollout, **scans.logged(rollout, per_tick))
     if not localiser.noisy or not rows:
@@ -152,7 +156,7 @@ class Logged:
         self._per_tick = rollout.record.rows_per_period
         self.state = self._state()
 
-    def advance(self, step: Step, actuated: Twist) -> None:
+    def advance(self, command: Twist, actuated: Twist, limiter: int = 0) -> None:
         """Advance to the row of the next control period."""
         self.actuated.append(actuated)
         self._row = min(self._row + self._per_tick, len(self._rollout.t) - 1)
@@ -160,24 +164,6 @@ class Logged:
 
     def _state(self) -> State:
         return State(*self._rollout.pose[self._row].tolist(), *self._rollout.twist[self._row].tolist())
-
-
-class Reader(Decider):
-    """Decider that reads commands from a log, and resets the map when the robot did."""
-
-    def __init__(self, rollout: Rollout, periods: int, resets: Mapping[int, Callable[[Pose], None]]) -> None:
-        self.step = Step()
-        self._rollout, self._periods, self._resets = rollout, periods, resets
-        self._per_tick = rollout.record.rows_per_period
-
-    def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
-        """Return the logged command of a control period, or the end."""
-        if tick == self._periods:
-            return Ending(self._rollout.outcome)
-        if tick in self._resets:
-            self._resets[tick](pose)
-        self.step = Step(Twist(*self._rollout.command[tick * self._per_tick + 1].tolist()))
-        return None
 
 
 def scans_of(rollout: Rollout) -> tuple[Scans | None, Mapping[int, Callable[[Pose], None]]]:

@@ -194,7 +194,7 @@ class Avoid:
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the command that avoids movers."""
-        avoidance, (tick, pose, _, path, before, _) = self._avoidance, now
+        avoidance, (tick, pose, path, before, _) = self._avoidance, now
         last, ahead = before.command, avoidance.prediction_times
         stopping = before.avoids and self._stops_at_goal(pose, last)
         if stopping:

@@ -1,0 +1,117 @@
+"""Body of a robot in a drive: its plant, its senses, and the referee that ends the drive."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from antdrive.base import Pose
+from antdrive.robots import Twist
+from antdrive.sim.driving.parts import Ending, Localiser, Plant, Scanning
+from antdrive.sim.log.ending import arrived, control_periods, outcome_at
+from antdrive.sim.log.outcome import Outcome
+
+if TYPE_CHECKING:
+    from antdrive.worlds import Task
+
+
+class Observation(NamedTuple):
+    """What a robot knows in one control period."""
+
+    tick: int  # the number of the control period
+    estimate: Pose  # estimated pose
+    pose: Pose  # estimated pose when the next command takes effect
+    twist: Twist  # measured speed and yaw rate
+
+
+class Note(NamedTuple):
+    """What a robot tells of a command."""
+
+    limiter: int = 0  # the rule that limited the speed, an index into the record's `limiters`
+    ending: Ending | None = None  # why it gives up: at once without a command, else after the control period
+
+
+SILENT = Note()
+
+
+def no_scan(tick: int, pose: Pose, estimate: Pose) -> Pose:
+    """Return the estimate unchanged, for a robot without scans."""
+    return estimate
+
+
+class Body:
+    """Robot that is observed and commanded period by period, until its drive ends.
+
+    Attributes:
+        tick: the number of the control period
+        ended: how the drive ended; None while it goes on
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        localiser: Localiser,
+        scan: Scanning = no_scan,
+        *,
+        hz: int,  # control periods per second
+        limit: float,  # time limit [s]
+        task: Task | None = None,  # where the drive ends; None: nowhere
+    ) -> None:
+        self._plant, self._localiser, self._scan, self._task = plant, localiser, scan, task
+        self._periods = control_periods(limit, hz)
+        self._command = Twist(0.0, 0.0)  # in force
+        self._now: Observation | None = None
+        self.tick = 0
+        self.ended = Ending(Outcome.COLLIDED) if plant.touched else self._timed_out()
+
+    def observe(self) -> Observation:
+        """Return what the robot observes in this control period."""
+        if self._now is None:
+            state = self._plant.state
+            estimate = self._scan(self.tick, state.pose, self._localiser.sense(state))
+            pose = self._localiser.settle(estimate)
+            self._now = Observation(self.tick, estimate, pose, Twist(state.speed, state.yaw_rate))
+        return self._now
+
+    def step(self, command: Twist | None, note: Note = SILENT) -> None:
+        """Drive for one control period; without a command, or at the goal, the drive ends where the robot stands."""
+        now = self.observe()
+        if self._arrived(now) or (command is None and note.ending is None):
+            self.ended = self._judged(now.estimate)
+            return
+        if command is None:
+            self.ended = note.ending
+            return
+        self._command, self._now = command, None
+        self._plant.advance(command, self._localiser.actuate(command), note.limiter)
+        self.ended = Ending(Outcome.COLLIDED) if self._plant.touched else note.ending
+        if self.ended is None:
+            self.tick += 1
+            self.ended = self._timed_out()
+
+    def _arrived(self, now: Observation) -> bool:
+        """Return whether the robot stands at the goal by its estimate, once it has had a command."""
+        task = self._task
+        if task is None or not self.tick:
+            return False
+        return arrived(now.estimate, now.twist, self._command, task.goal, task.goal_tolerance)
+
+    def _timed_out(self) -> Ending | None:
+        return Ending(Outcome.TIMED_OUT) if self.tick >= self._periods else None
+
+    def _judged(self, believed: Pose) -> Ending:
+        """Return the ending of a robot that stands without contact and believes to be at a pose."""
+        task, true = self._task, self._plant.state.pose
+        assert task is not None
+        left, off = math.dist(true[:2], task.goal), math.dist(believed[:2], task.goal)
+        outcome = outcome_at(true, task.goal, task.goal_tolerance)
+        if outcome is Outcome.SUCCEEDED:
+            return Ending(outcome)
+        why = f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
+        if off <= task.goal_tolerance:
+            why = (
+                f"the robot believed that it was at the goal, {off:.2f} m from it, but was {left:.3f} m from it "
+                f"(the tolerance is {task.goal_tolerance:g} m): its estimate was wrong by "
+                f"{math.dist(believed[:2], true[:2]):.2f} m"
+            )
+        return Ending(outcome, why)
