@@ -9,7 +9,6 @@ from .control.pursuit import PursuitState as PursuitState
 from .control.pursuit import TrackedPath as TrackedPath
 from .control.pursuit import Twist as Twist
 from .lidar import Lidar as Lidar
-from .noise import NoiseModel as NoiseModel
 from .robot_file import list_robots as list_robots
 from .robot_file import load_robot as load_robot
 from .robot_file import robot_schema as robot_schema

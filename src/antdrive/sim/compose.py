@@ -16,9 +16,9 @@ from antdrive.sim.driving.body import no_scan
 from antdrive.sim.driving.drive import full_turn
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.habits import Habits
-from antdrive.sim.driving.localising import localiser_of
+from antdrive.sim.driving.localising import Exact, localiser_of
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import Localiser, Logs, RouteGuide, Rule, Scanning
+from antdrive.sim.driving.parts import Logs, RouteGuide, Rule, Scanning
 from antdrive.sim.driving.perceived_movers import GroundTruth, PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
@@ -31,6 +31,7 @@ from antdrive.sim.driving.rules import (
     SlowAtCorners,
     TurnToScan,
 )
+from antdrive.sim.driving.senses import Senses, senses_of
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverDetector, MoverTracking, SimulatedLidar, Survey
 from antdrive.sim.policy import Perception
@@ -47,7 +48,8 @@ BLIND_SHARE = (
 class Parts(NamedTuple):
     """Parts of a drive, and their entries in its record; None: unused."""
 
-    localiser: Localiser
+    senses: Senses
+    localiser: Exact
     scan: Scanning
     guide: RouteGuide
     rules: tuple[Rule, ...]  # in order of application
@@ -62,7 +64,9 @@ def compose(s: Scenario) -> Parts:
     tracks_movers, mapped = perception.kind == "lidar", s.map == "given"
     moving = s.moving
     start, mapless = s.task.start, not mapped
-    localiser = localiser_of(s.localisation, s.robot, s.noise, s.odometry, 1 / hz, start, s.seed, mapless=mapless)
+    levels = s.localisation, s.robot, s.noise, s.odometry, 1 / hz
+    senses = senses_of(*levels, s.seed, mapless=mapless)
+    localiser = localiser_of(*levels, start, mapless=mapless)
     survey = None if mapped else _survey(s, tracks_movers, matching=localiser.matched)
     scans = _mover_detector(s) if mapped and tracks_movers else survey
     tracking = scans.tracking if scans else None
@@ -98,11 +102,12 @@ def compose(s: Scenario) -> Parts:
     if survey:
         rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_command))
     return Parts(
+        senses,
         localiser,
         scans.scan if scans else no_scan,
         guide,
         tuple(rules),
-        tuple(part for part in (localiser, guide, scans, tracking) if part is not None),
+        tuple(part for part in (guide, scans, tracking) if part is not None),
         limiters=EXPLORING_LIMITERS if survey else LIMITERS,
         mapped=mapped,
     )

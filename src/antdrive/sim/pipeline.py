@@ -180,6 +180,7 @@ def driven(
     driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz)
     with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories) as engine:
         plant = Bullet(engine, s.task.start, s.control_hz)
-        body = Body(plant, parts.localiser, parts.scan, hz=s.control_hz, limit=limit, task=s.task)
+        body = Body(plant, parts.senses, parts.localiser, parts.scan, hz=s.control_hz, limit=limit, task=s.task)
         log = plant.finish(drive(body, driver, progress))
+    parts = parts._replace(logs=(body, *parts.logs))
     return grid, answer, rollout_of(s, parts, grid, answer, route, log, limit, time.perf_counter() - started)

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 
 from antdrive.base import FieldError
 from antdrive.planners import Query, load_planner, smooth
-from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, load_robot
+from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, Noise, PurePursuit, PursuitState, Twist, load_robot
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
 from antdrive.sim.driving.blockage import blocked_cells, covered_discs
 from antdrive.sim.driving.body import SILENT, Body, Note, Observation
 from antdrive.sim.driving.drive import STUCK_PROGRESS, STUCK_TIME, Driver, OnePath, StuckClock, drive, follow, full_turn
-from antdrive.sim.driving.localising import Exact, TruePose
+from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import Ending, Guide, Moment, Step
 from antdrive.sim.driving.perceived_movers import GroundTruth
 from antdrive.sim.driving.plants import Bullet, Kinematic
@@ -37,6 +37,7 @@ from antdrive.sim.driving.rules import (
     slow_down,
     stopping_time,
 )
+from antdrive.sim.driving.senses import NoisySenses, Senses
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, rasterise
@@ -65,12 +66,22 @@ def seen(tick=0, pose=TASK.start, speed=0.0):
     return Observation(tick, pose, pose, Twist(speed, 0.0))
 
 
+class Off(Senses):
+    """Senses that are off, and noted."""
+
+    def __init__(self, true, believed):
+        self.off, self.states = np.subtract(believed, true), []
+
+    def read(self, state):
+        self.states.append(state)
+        x, y = (state.pose[:2] + self.off).tolist()
+        return Twist(0.0, 0.0), (x, y, state.yaw)
+
+
 def standing(true, believed=None, periods=9):
     """The body of a robot that stands at a true position and believes to be elsewhere."""
-    exact = Exact()
-    exact.sense = lambda state: (*(believed or true), 0.0)
     plant = Kinematic((*true, 0.0), lambda pose, twist: np.array([pose]))
-    return Body(plant, exact, hz=60, limit=periods / 60, task=TASK)
+    return Body(plant, Off(true, believed or true), Exact(TASK.start, 1 / 60), hz=60, limit=periods / 60, task=TASK)
 
 
 def at(driving, arc):
@@ -405,7 +416,8 @@ def test_the_reason_is_that_of_the_period_in_which_the_drive_ends():
         for command, steps in ((None, asked), (Twist(0.0, 0.0), min(asked + 1, 30))):
             plant = Kinematic(TASK.start, lambda pose, twist: np.array([pose]))
             mind = EndsAt(last, command)
-            assert drive(Body(plant, Exact(), hz=60, limit=0.5), mind).outcome is outcome
+            body = Body(plant, Senses(), Exact(TASK.start, 1 / 60), hz=60, limit=0.5)
+            assert drive(body, mind).outcome is outcome
             assert mind.asked == [(outcome, asked)]
             assert len(plant.poses) == 1 + steps
 
@@ -425,25 +437,31 @@ def test_a_goal_missed_by_the_estimate_triggers_a_replan(turtlebot, off, knows, 
 
 def test_a_robot_that_stands_at_the_goal_has_arrived_whatever_it_commands():
     """It is observed once in a period. Before its first command it has not arrived."""
-    plant, asked = Kinematic((*TASK.goal, 0.0), lambda pose, twist: np.array([pose])), []
-    exact = Exact()
-    exact.sense = lambda state: asked.append(state) or state.pose
-    body = Body(plant, exact, hz=60, limit=1.0, task=TASK)
+    body = standing(TASK.goal)
     for _ in range(2):
         assert body.ended is None
         assert body.observe() is body.observe()
         body.step(Twist(0.0, 0.0))
     assert body.ended == (Outcome.SUCCEEDED, "")
-    assert (body.tick, len(asked), len(plant.poses)) == (1, 2, 2)
+    assert (body.tick, len(body._senses.states), len(body._plant.poses)) == (1, 2, 2)
 
 
 def test_a_path_is_followed_by_the_estimates_of_the_localiser(turtlebot):
     """At an estimate 0.5 m to the left of the robot, it turns right."""
-    beside = Exact()
-    beside.settle = lambda pose: (pose[0], pose[1] + 0.5, pose[2])
     with Engine(TASK.world, turtlebot) as engine:
-        log = follow(engine, PurePursuit(), driver(turtlebot).path, TASK, limit=1.0, localiser=beside)
+        log = follow(engine, PurePursuit(), driver(turtlebot).path, TASK, limit=1.0, senses=Off((0, 0), (0, 0.5)))
     assert log.pose[-1, 2] < -0.1
+
+
+def test_a_robot_is_observed_where_it_will_be_when_its_next_command_takes_effect(turtlebot):
+    """Three commands have not reached its motors yet: 0.1, 0.2 and 0.3 m/s."""
+    plant = Kinematic(TASK.start, lambda pose, twist: np.array([pose]))
+    delayed = NoisySenses(Noise(delay=0.05), turtlebot.track, 1 / 60, 0)
+    body = Body(plant, delayed, Exact(TASK.start, 1 / 60), hz=60, limit=1.0)
+    for speed in (0.1, 0.2, 0.3):
+        body.step(Twist(speed, 0.0))
+    now = body.observe()
+    assert np.subtract(now.pose, now.estimate) == pytest.approx((0.6 / 60, 0.0, 0.0))
 
 
 def test_progress_is_reported_ten_times_a_second(turtlebot):
@@ -459,12 +477,13 @@ def test_progress_is_reported_ten_times_a_second(turtlebot):
 def test_the_first_row_is_at_rest_and_estimates_keep_their_error(turtlebot):
     with Engine(TASK.world, turtlebot) as engine:
         plant = Bullet(engine, TASK.start, 80)
-        x, y, yaw = plant.state.pose
-        localiser = TruePose(turtlebot.noise, turtlebot.track, 1 / 80, TASK.start, np.random.default_rng(0))
-        localiser.settle((x + 0.1, y - 0.2, yaw + 0.3 + 2 * np.pi))
-        plant.advance(Twist(0.2, 0.1), Twist(0.3, 0.4), 2)
-        found = plant.finish(Ending(Outcome.TIMED_OUT))
-        logged = localiser.logged(found, plant.per_tick)
+        senses = Off((0, 0), (0.1, -0.2))
+        senses.noisy, senses.actuate = True, lambda command: Twist(0.3, 0.4)
+        body = Body(plant, senses, Exact(TASK.start, 1 / 80), hz=80, limit=1 / 80)
+        body.step(Twist(0.2, 0.1), Note(limiter=2))
+        body.estimates[0] = (*body.estimates[0][:2], body.estimates[0][2] + 0.3 + 2 * np.pi)
+        found = plant.finish(body.ended)
+        logged = body.logged(found, plant.per_tick)
     np.testing.assert_array_equal(found.command, [(0.0, 0.0), *[(0.2, 0.1)] * 3])
     np.testing.assert_array_equal(logged["actuated"], [(0.0, 0.0), *[(0.3, 0.4)] * 3])
     np.testing.assert_array_equal(found.limiter, [0, 2, 2, 2])

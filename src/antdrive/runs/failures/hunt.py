@@ -15,17 +15,19 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from antdrive.base import Floats, Pose
+from antdrive.base import Floats
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import PlannerError
 from antdrive.robots import PursuitState, Twist, footprint_clearance
+from antdrive.robots.noise import moved
 from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.sim.compose import route_planner
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.localising import localiser_of
 from antdrive.sim.driving.plants import Kinematic
 from antdrive.sim.driving.routes import OneRoute
+from antdrive.sim.driving.senses import senses_of
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import plan
@@ -147,24 +149,19 @@ def rehearsed_clearance(s: Scenario) -> float:
         return math.inf
     known = dataclasses.replace(route_planner(s), task=s.task, smoothing=s.smoothing)
     route, path = OneRoute(known).route(grid, answer)
-    localiser = localiser_of("fixes", s.robot, s.noise, 1.0, 1 / s.control_hz, s.task.start, s.seed)
-    plant = Kinematic(s.task.start, lambda pose, twist: np.array([_moved(pose, twist, 1 / s.control_hz)]))
+    period = 1 / s.control_hz
+    levels = "fixes", s.robot, s.noise, 1.0, period
+    senses, localiser = senses_of(*levels, s.seed), localiser_of(*levels, s.task.start)
+    plant = Kinematic(s.task.start, lambda pose, twist: np.array([moved(pose, Twist(*(period * v for v in twist)))]))
     limit = SETTLING + PATIENCE * route.length / s.robot.max_speed
-    body, command, state = Body(plant, localiser, hz=s.control_hz, limit=limit), Twist(0.0, 0.0), PursuitState()
+    body = Body(plant, senses, localiser, hz=s.control_hz, limit=limit)
+    command, state = Twist(0.0, 0.0), PursuitState()
     while body.ended is None and not (
         state.arc > path.length - path.goal_distance and abs(plant.state.speed) < STANDING
     ):
         command, state = s.controller.step(path, body.observe().pose, command, state)
         body.step(command)
     return float(footprint_clearance(s.driven_world, s.robot.footprint, plant.poses).min())
-
-
-def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
-    """Return a pose after driving with a twist for a time [s]."""
-    x, y, yaw = pose
-    middle = yaw + twist.yaw_rate * time / 2
-    way = twist.speed * time
-    return x + way * math.cos(middle), y + way * math.sin(middle), math.remainder(yaw + twist.yaw_rate * time, math.tau)
 
 
 POINTS = 60  # of a line, equally spaced

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from antdrive.base import Pose
 from antdrive.robots import Twist
-from antdrive.sim.driving.parts import Ending, Localiser, Plant, Scanning
+from antdrive.robots.noise import moved
+from antdrive.sim.driving.localising import Exact
+from antdrive.sim.driving.parts import Ending, Plant, Rows, Scanning
+from antdrive.sim.driving.senses import Senses
 from antdrive.sim.log.ending import arrived, control_periods, outcome_at
 from antdrive.sim.log.outcome import Outcome
 
@@ -45,20 +50,23 @@ class Body:
     Attributes:
         tick: the number of the control period
         ended: how the drive ended; None while it goes on
+        estimates: the estimated pose of each control period so far
     """
 
     def __init__(
         self,
         plant: Plant,
-        localiser: Localiser,
+        senses: Senses,
+        localiser: Exact,
         scan: Scanning = no_scan,
         *,
         hz: int,  # control periods per second
         limit: float,  # time limit [s]
         task: Task | None = None,  # where the drive ends; None: nowhere
     ) -> None:
-        self._plant, self._localiser, self._scan, self._task = plant, localiser, scan, task
-        self._periods = control_periods(limit, hz)
+        self._plant, self._senses, self._localiser, self._scan, self._task = plant, senses, localiser, scan, task
+        self._periods, self._period = control_periods(limit, hz), 1 / hz
+        self.estimates: list[Pose] = []
         self._command = Twist(0.0, 0.0)  # in force
         self._now: Observation | None = None
         self.tick = 0
@@ -68,8 +76,11 @@ class Body:
         """Return what the robot observes in this control period."""
         if self._now is None:
             state = self._plant.state
-            estimate = self._scan(self.tick, state.pose, self._localiser.sense(state))
-            pose = self._localiser.settle(estimate)
+            estimate = self._scan(self.tick, state.pose, self._localiser.update(*self._senses.read(state)))
+            self._localiser.pose = pose = estimate
+            self.estimates.append(estimate)
+            for command in self._senses.pending:
+                pose = moved(pose, command, self._period)
             self._now = Observation(self.tick, estimate, pose, Twist(state.speed, state.yaw_rate))
         return self._now
 
@@ -83,11 +94,25 @@ class Body:
             self.ended = note.ending
             return
         self._command, self._now = command, None
-        self._plant.advance(command, self._localiser.actuate(command), note.limiter)
+        self._plant.advance(command, self._senses.actuate(command), note.limiter)
         self.ended = Ending(Outcome.COLLIDED) if self._plant.touched else note.ending
         if self.ended is None:
             self.tick += 1
             self.ended = self._timed_out()
+
+    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+        """Return the estimates and the motor targets of a robot with noise; the error of an estimate stays constant within a
+        control period."""
+        if not self._senses.noisy:
+            return {}
+        errors = [
+            (x - true_x, y - true_y, math.remainder(yaw - true_yaw, 2 * math.pi))
+            for (x, y, yaw), (true_x, true_y, true_yaw) in zip(
+                self.estimates, log.pose[::per_tick].tolist(), strict=False
+            )
+        ]
+        period = np.minimum(np.arange(len(log.t)) // per_tick, max(len(errors) - 1, 0))
+        return {"estimate": log.pose + np.array(errors or [(0.0, 0.0, 0.0)])[period], "actuated": log.actuated}
 
     def _arrived(self, now: Observation) -> bool:
         """Return whether the robot stands at the goal by its estimate, once it has had a command."""

@@ -10,9 +10,10 @@ from antdrive.base import Pose
 from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, Twist
 from antdrive.sim.driving.body import SILENT, Body, Note, Observation
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import Ending, Guide, Localiser, Moment, Rule, Step
+from antdrive.sim.driving.parts import Ending, Guide, Moment, Rule, Step
 from antdrive.sim.driving.plants import Bullet, Drive
 from antdrive.sim.driving.rules import SIGHT_LIMIT, WAITING_SPEED, Pursuit
+from antdrive.sim.driving.senses import Senses
 from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME, arrived, stopped
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine
@@ -169,7 +170,8 @@ def follow(
     *,
     limit: float,
     control_hz: int = 60,
-    localiser: Localiser | None = None,
+    senses: Senses | None = None,
+    localiser: Exact | None = None,
     rules: Sequence[Rule] = (),
     progress: Progress = ignore_progress,
 ) -> Drive:
@@ -177,5 +179,6 @@ def follow(
     pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))
     driver = Driver(OnePath(), (pursuit, *rules), path, task, engine.robot, control_hz)
     plant = Bullet(engine, task.start, control_hz)
-    body = Body(plant, localiser or Exact(), hz=control_hz, limit=limit, task=task)
+    localiser = localiser or Exact(task.start, 1 / control_hz)
+    body = Body(plant, senses or Senses(), localiser, hz=control_hz, limit=limit, task=task)
     return plant.finish(drive(body, driver, progress))

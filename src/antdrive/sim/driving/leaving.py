@@ -12,6 +12,7 @@ from antdrive.robots.clearance import footprint_distances, obstacle_name
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.plants import Kinematic
+from antdrive.sim.driving.senses import Senses
 from antdrive.worlds import World, point_clearance
 
 REHEARSED = 60.0  # limit of the rehearsal; the drive decides what follows [s]
@@ -66,7 +67,8 @@ def _rehearsed(
         lambda pose, twist: _way(pose, twist, 1 / hz, robot.radius),
         lambda way: bool((footprint_clearance(world, robot.footprint, way) <= 0).any()),
     )
-    body, command, state = Body(plant, Exact(), hz=hz, limit=REHEARSED), Twist(0.0, 0.0), PursuitState()
+    body = Body(plant, Senses(), Exact(start, 1 / hz), hz=hz, limit=REHEARSED)
+    command, state = Twist(0.0, 0.0), PursuitState()
     while body.ended is None:
         pose = body.observe().pose
         if not is_narrow(world, robot, pose):

@@ -91,19 +91,6 @@ class Logs(Protocol):
         """Return arrays by their names in `Rollout`; `per_tick` is the number of rows per control period."""
 
 
-class Localiser(Protocol):
-    """Pose estimator, which also models how commands reach the wheels."""
-
-    def sense(self, state: State) -> Pose:
-        """Return the estimated pose. Call once in every control period."""
-
-    def settle(self, estimate: Pose) -> Pose:
-        """Accept an estimate, possibly corrected by a scan; return the pose expected when the next command takes effect."""
-
-    def actuate(self, command: Twist) -> Twist:
-        """Return the motor targets for a command."""
-
-
 #: Callback that scans from the true pose if a scan is due; returns the estimate, possibly corrected.
 Scanning: TypeAlias = Callable[[int, Pose, Pose], Pose]
 

@@ -22,8 +22,9 @@ from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots import Twist
 from antdrive.sim.driving.body import Body, no_scan
-from antdrive.sim.driving.localising import Exact, logged_localiser
+from antdrive.sim.driving.localising import Exact, logged_senses
 from antdrive.sim.driving.plants import Bullet
+from antdrive.sim.driving.senses import Senses
 from antdrive.sim.driving.survey import MoverTracking, Scans, SimulatedLidar, Survey, reset_ticks
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
@@ -101,10 +102,10 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
     if record.exploring and not len(rollout.scans):
         yield "replay: a log without a map must have scans"
         return
-    localiser = logged_localiser(record)
-    if localiser.noisy and not len(rollout.actuated) == len(rollout.estimate) == len(rollout.t):
+    senses, localiser = logged_senses(record)
+    if senses.noisy and not len(rollout.actuated) == len(rollout.estimate) == len(rollout.t):
         yield "replay: actuated and estimate are missing; required with noise"
-        localiser = Exact()
+        senses, localiser = Senses(), Exact(record.task.start, 1 / record.control_hz)
     per_tick = record.rows_per_period
     # A period's first row is the last row of the previous period; a contact ends control.
     rows = range(0, min(rollout.first_contact, len(rollout.t) - 1), per_tick)
@@ -112,6 +113,7 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
     plant = Logged(rollout)
     body = Body(
         plant,
+        senses,
         localiser,
         scans.scan if scans else no_scan,
         hz=record.control_hz,
@@ -126,9 +128,9 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
         body.observe()
     if scans:
         yield from _other_scans(rollout, **scans.logged(rollout, per_tick))
-    if not localiser.noisy or not rows:
+    if not senses.noisy or not rows:
         return
-    off = np.array(localiser.estimates[: len(rows)]) - rollout.estimate[rows]
+    off = np.array(body.estimates[: len(rows)]) - rollout.estimate[rows]
     off[:, 2] = wrap_angle(off[:, 2])
     for name, error in (
         ("estimate", off),
@@ -177,7 +179,7 @@ def scans_of(rollout: Rollout) -> tuple[Scans | None, Mapping[int, Callable[[Pos
     if not record.exploring:
         return Scans(sensor), {}
     tracks_movers = record.perception is not None and record.perception.kind == "lidar"
-    tracking, matching = MoverTracking(lidar, hz) if tracks_movers else None, logged_localiser(record).matched
+    tracking, matching = MoverTracking(lidar, hz) if tracks_movers else None, logged_senses(record)[1].matched
     survey = Survey.of(record.robot, record.task, sensor, matching=matching, tracking=tracking)
     return survey, dict.fromkeys(reset_ticks(record), survey.reset)
 

@@ -1,4 +1,3 @@
-from .dead_reckoning import DeadReckoning as DeadReckoning
 from .mapping import OccupancyMap as OccupancyMap
 from .mapping import clear_distance as clear_distance
 from .mapping import clear_turn as clear_turn
