@@ -30,8 +30,7 @@ from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import Driver
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import SimulatedLidar
-from antdrive.sim.sensing import OccupancyMap
+from antdrive.sim.sensing import OccupancyMap, Scanner
 from antdrive.sim.sensing.matching import ScanMatcher
 from benchmarks.drives import barn_tasks
 from benchmarks.markdown import command_line, print_table
@@ -103,7 +102,7 @@ def rows(source: Path, drives: int, worlds: int) -> Iterator[list[str]]:
     for owner, method in ((Body, "observe"), (Driver, "act"), (Body, "step")):
         meter.watch(owner, method, PERIOD)
     for owner, method, name in (
-        (SimulatedLidar, "ranges", "scan"),
+        (Scanner, "scan", "scan"),
         (ScanMatcher, "corrected", "match"),
         (OccupancyMap, "insert", "map"),
         (Exploration, "trigger", "watch"),

@@ -356,9 +356,8 @@ def composition() -> list[str]:
     def row(kind: str) -> Row:
         world, name, settings = kinds[kind]
         parts = compose(Scenario.of(world, name, **settings))
-        scan = getattr(parts.scan, "__self__", None)
         rules = ", ".join(code(type(rule).__name__) for rule in parts.rules)
-        return kind, *map(_class, (parts.localiser, scan, parts.guide)), rules
+        return kind, *map(_class, (parts.localiser, parts.scans, parts.guide)), rules
 
     return table("drive, localiser, scans, guide, rules in order", map(row, kinds))
 

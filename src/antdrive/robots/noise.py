@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -71,6 +72,13 @@ def moved(pose: Pose, twist: Twist, time: float = 1.0) -> Pose:
         y + twist.speed * math.sin(middle) * time,
         yaw + twist.yaw_rate * time,
     )
+
+
+def moved_by(pose: Pose, commands: Iterable[Twist], period: float) -> Pose:
+    """Return a pose after driving with commands in turn, each for a period [s]."""
+    for command in commands:
+        pose = moved(pose, command, period)
+    return pose
 
 
 def steady_errors(noise: Noise, track: float) -> tuple[float, float]:

@@ -12,13 +12,12 @@ from typing import NamedTuple
 from antdrive.robots import LIMITERS, Avoidance
 from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
-from antdrive.sim.driving.body import no_scan
 from antdrive.sim.driving.drive import full_turn
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import Exact, localiser_of
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import Logs, RouteGuide, Rule, Scanning
+from antdrive.sim.driving.parts import Logs, RouteGuide, Rule
 from antdrive.sim.driving.perceived_movers import GroundTruth, PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
@@ -32,8 +31,9 @@ from antdrive.sim.driving.rules import (
     TurnToScan,
 )
 from antdrive.sim.driving.senses import Senses, senses_of
+from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import MoverDetector, MoverTracking, SimulatedLidar, Survey
+from antdrive.sim.driving.survey import MoverDetector, MoverTracking, Scans, Survey, turning_room
 from antdrive.sim.policy import Perception
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
@@ -50,7 +50,8 @@ class Parts(NamedTuple):
 
     senses: Senses
     localiser: Exact
-    scan: Scanning
+    lidar: SimulatedLidar | None
+    scans: Scans | None
     guide: RouteGuide
     rules: tuple[Rule, ...]  # in order of application
     logs: tuple[Logs, ...]
@@ -67,7 +68,8 @@ def compose(s: Scenario) -> Parts:
     levels = s.localisation, s.robot, s.noise, s.odometry, 1 / hz
     senses = senses_of(*levels, s.seed, mapless=mapless)
     localiser = localiser_of(*levels, start, mapless=mapless)
-    survey = None if mapped else _survey(s, tracks_movers, matching=localiser.matched)
+    lidar = None if mapped and not tracks_movers else _simulated_lidar(s)
+    survey = _survey(s, lidar, tracks_movers, matching=localiser.matched) if lidar and not mapped else None
     scans = _mover_detector(s) if mapped and tracks_movers else survey
     tracking = scans.tracking if scans else None
     movers: PerceivedMovers = (
@@ -104,10 +106,11 @@ def compose(s: Scenario) -> Parts:
     return Parts(
         senses,
         localiser,
-        scans.scan if scans else no_scan,
+        lidar,
+        scans,
         guide,
         tuple(rules),
-        tuple(part for part in (guide, scans, tracking) if part is not None),
+        tuple(part for part in (guide, tracking) if part is not None),
         limiters=EXPLORING_LIMITERS if survey else LIMITERS,
         mapped=mapped,
     )
@@ -179,10 +182,12 @@ def _exploration(s: Scenario, survey: Survey) -> Exploration:
     return Exploration(route_planner(s), survey, policy, ahead)
 
 
-def _survey(s: Scenario, tracks_movers: bool, *, matching: bool) -> Survey:
+def _survey(s: Scenario, lidar: SimulatedLidar, tracks_movers: bool, *, matching: bool) -> Survey:
     """Create the mapping of a mapless robot."""
     tracking = MoverTracking(_lidar(s), s.control_hz) if tracks_movers else None
-    return Survey.of(s.robot, s.task, _sensor(s), matching=matching, tracking=tracking)
+    matching = matching and (tracks_movers or not s.task.world.movers)  # movers without tracks would shift the match
+    sight = lidar.first(s.task.start, turning_room(s.robot.radius))
+    return Survey(s.robot, s.task.start, s.task.goal, s.control_hz, sight, matching=matching, tracking=tracking)
 
 
 def _mover_detector(s: Scenario) -> MoverDetector:
@@ -190,7 +195,7 @@ def _mover_detector(s: Scenario) -> MoverDetector:
     noise, lidar = s.robot.noise.scaled(s.noise), _lidar(s)
     errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
     ground = KnownGround(lidar, s.task.world, math.inf, *errors)
-    return MoverDetector(_sensor(s), ground, MoverTracking(lidar, s.control_hz, *errors))
+    return MoverDetector(ground, MoverTracking(lidar, s.control_hz, *errors))
 
 
 def _lidar(s: Scenario) -> Lidar:
@@ -198,6 +203,6 @@ def _lidar(s: Scenario) -> Lidar:
     return s.robot.lidar
 
 
-def _sensor(s: Scenario) -> SimulatedLidar:
+def _simulated_lidar(s: Scenario) -> SimulatedLidar:
     """Simulate the lidar in the driven world."""
     return SimulatedLidar.of(_lidar(s), s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)

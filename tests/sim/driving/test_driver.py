@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from antdrive.base import FieldError
 from antdrive.planners import Query, load_planner, smooth
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, Noise, PurePursuit, PursuitState, Twist, load_robot
+from antdrive.robots.noise import moved_by
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
 from antdrive.sim.driving.blockage import blocked_cells, covered_discs
@@ -63,7 +64,7 @@ def driver(robot, guide=None, *rules):
 
 def seen(tick=0, pose=TASK.start, speed=0.0):
     """What a robot without errors observes."""
-    return Observation(tick, pose, pose, Twist(speed, 0.0))
+    return Observation(tick, pose, (), Twist(speed, 0.0))
 
 
 class Off(Senses):
@@ -358,7 +359,7 @@ def test_a_robot_that_gives_way_is_not_stuck(turtlebot):
     )
     waits = driver(turtlebot, None, Avoid(cautious, nobody, OnePath(), TASK, turtlebot, 60))
     for tick in range(round(STUCK_TIME * 60) + 20):
-        assert waits.act(seen(tick)) == ((0.0, 0.0), Note(AVOIDING))
+        assert waits.act(seen(tick)) == ((0.0, 0.0), Note(TASK.start, AVOIDING))
 
 
 class Watcher(Guide):
@@ -453,7 +454,7 @@ def test_a_path_is_followed_by_the_estimates_of_the_localiser(turtlebot):
     assert log.pose[-1, 2] < -0.1
 
 
-def test_a_robot_is_observed_where_it_will_be_when_its_next_command_takes_effect(turtlebot):
+def test_a_robot_steers_from_where_it_will_be_when_its_next_command_takes_effect(turtlebot):
     """Three commands have not reached its motors yet: 0.1, 0.2 and 0.3 m/s."""
     plant = Kinematic(TASK.start, lambda pose, twist: np.array([pose]))
     delayed = NoisySenses(Noise(delay=0.05), turtlebot.track, 1 / 60, 0)
@@ -461,7 +462,12 @@ def test_a_robot_is_observed_where_it_will_be_when_its_next_command_takes_effect
     for speed in (0.1, 0.2, 0.3):
         body.step(Twist(speed, 0.0))
     now = body.observe()
-    assert np.subtract(now.pose, now.estimate) == pytest.approx((0.6 / 60, 0.0, 0.0))
+    assert now.pose == TASK.start
+    assert moved_by(now.pose, now.pending, 1 / 60) == pytest.approx((TASK.start[0] + 0.6 / 60, *TASK.start[1:]))
+    seen_by = []
+    robot = driver(turtlebot, None, SimpleNamespace(apply=lambda at, step: seen_by.append(at.pose) or step))
+    robot.act(now)
+    assert seen_by == [moved_by(now.pose, now.pending, 1 / 60)]
 
 
 def test_progress_is_reported_ten_times_a_second(turtlebot):
@@ -480,8 +486,8 @@ def test_the_first_row_is_at_rest_and_estimates_keep_their_error(turtlebot):
         senses = Off((0, 0), (0.1, -0.2))
         senses.noisy, senses.actuate = True, lambda command: Twist(0.3, 0.4)
         body = Body(plant, senses, Exact(TASK.start, 1 / 80), hz=80, limit=1 / 80)
-        body.step(Twist(0.2, 0.1), Note(limiter=2))
-        body.estimates[0] = (*body.estimates[0][:2], body.estimates[0][2] + 0.3 + 2 * np.pi)
+        x, y, yaw = body.observe().pose
+        body.step(Twist(0.2, 0.1), Note((x, y, yaw + 0.3 + 2 * np.pi), 2))
         found = plant.finish(body.ended)
         logged = body.logged(found, plant.per_tick)
     np.testing.assert_array_equal(found.command, [(0.0, 0.0), *[(0.2, 0.1)] * 3])

@@ -23,8 +23,9 @@ from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import IDLE_TIME, Recovery, ScanTurn
 from antdrive.sim.driving.replay import replay, scans_of
 from antdrive.sim.driving.routes import RoutePlanner, bounds_of
+from antdrive.sim.driving.simulated_lidar import FirstSight
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import MoverTracking, SimulatedLidar, Survey, reset_ticks
+from antdrive.sim.driving.survey import MoverTracking, Survey, reset_ticks
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.policy import SCANNED, STALLED, Perception
 from antdrive.sim.recorded import rebuilt
@@ -313,12 +314,13 @@ def test_the_map_is_reset_after_failed_plans(log):
 
 def own_map(log):
     """The map that the robot of a log had at last."""
-    survey, resets = scans_of(log)
-    assert isinstance(survey, Survey)
+    lidar, survey, resets = scans_of(log)
     for row in range(0, len(log.t), log.record.physics_hz // log.record.control_hz):
         tick = row * log.record.control_hz // log.record.physics_hz
         estimate = tuple(log.estimate[row].tolist()) if len(log.estimate) else tuple(log.pose[row].tolist())
-        survey.scan(tick, tuple(log.pose[row].tolist()), estimate)
+        ranges = lidar.scan(tick, tuple(log.pose[row].tolist()))
+        if ranges is not None:
+            survey.read(tick, estimate, ranges)
         resets.get(tick, lambda pose: None)(estimate)
     return survey.map
 
@@ -351,7 +353,7 @@ def test_without_noise_pose_fixes_are_true_poses(jackal):
 @pytest.mark.parametrize(("kind", "matches"), [("positions", False), ("lidar", True)])
 def test_scans_are_matched_among_movers_only_if_they_are_tracked(kind, matches, jackal):
     made = scenario(jackal, "people-crossing", localisation="fixes", perception=Perception(kind=kind))
-    survey = compose(made).scan.__self__
+    survey = compose(made).scans
     assert (survey._matcher is not None) is matches
 
 
@@ -458,10 +460,13 @@ def test_plans_that_failed_long_ago_are_no_reason(jackal):
 def test_a_map_counts_the_scans_that_are_taken(jackal, rate, share):
     """At 60 control periods a second a lidar of 1000 Hz takes 60 scans, of which 12 are entered as a whole."""
     robot = changed(jackal, "lidar", rate=rate)
-    survey = compose(scenario(robot)).guide.survey
+    parts = compose(scenario(robot))
+    survey = parts.scans
     assert survey.map.share == share
-    for tick in range(1, 61):
-        survey.scan(tick, TASK.start, TASK.start)
+    for tick in range(61):
+        ranges = parts.lidar.scan(tick, TASK.start)
+        if ranges is not None:
+            survey.read(tick, TASK.start, ranges)
     assert len(survey.scans) == pytest.approx(min(rate, 60), abs=1)
     assert survey.whole == pytest.approx(min(rate, 60) / share, abs=1)
     assert survey._recent == min(rate, 60)
@@ -469,9 +474,8 @@ def test_a_map_counts_the_scans_that_are_taken(jackal, rate, share):
 
 
 def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal):
-    sensor = SimulatedLidar(Scanner.of(jackal.lidar, ROOM), ROOM, None, None, 60)
-    survey = Survey(sensor, jackal, TASK.start, TASK.goal)
-    survey.scan(0, TASK.start, TASK.start)
+    sight = FirstSight(ROOM, Scanner.of(jackal.lidar, ROOM).scan(TASK.start))
+    survey = Survey(jackal, TASK.start, TASK.goal, 60, sight)
     caution = StoppingConstraint(survey, jackal, 60, 0.1, lambda tick, held: None)
     free = caution.limit(TASK.start, Twist(1.0, 0.0), Twist(1.0, 0.0))
     assert free == (Twist(1.0, 0.0), False)  # stops within 0.35 m, sees 2 m
@@ -573,7 +577,7 @@ def test_a_robot_without_a_path_at_the_end_of_its_route_keeps_searching_for_a_wh
     exploration.lost = lost
     robot.step = Step(pursuit=PursuitState(arc=tracked.length))
     exploration.trigger = lambda *_: ""
-    command, _ = robot.act(Observation(0, HERE, HERE, Twist(0.0, 0.0)))
+    command, _ = robot.act(Observation(0, HERE, (), Twist(0.0, 0.0)))
     assert (command is not None) == lost
     assert asked == ([] if lost else ["missed the goal"])
 

@@ -20,7 +20,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import PlannerError
 from antdrive.robots import PursuitState, Twist, footprint_clearance
-from antdrive.robots.noise import moved
+from antdrive.robots.noise import moved, moved_by
 from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.sim.compose import route_planner
 from antdrive.sim.driving.body import Body
@@ -159,7 +159,8 @@ def rehearsed_clearance(s: Scenario) -> float:
     while body.ended is None and not (
         state.arc > path.length - path.goal_distance and abs(plant.state.speed) < STANDING
     ):
-        command, state = s.controller.step(path, body.observe().pose, command, state)
+        now = body.observe()
+        command, state = s.controller.step(path, moved_by(now.pose, now.pending, period), command, state)
         body.step(command)
     return float(footprint_clearance(s.driven_world, s.robot.footprint, plant.poses).min())
 

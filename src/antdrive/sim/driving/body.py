@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from antdrive.base import Pose
+from antdrive.base import Floats, Pose
 from antdrive.robots import Twist
-from antdrive.robots.noise import moved
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import Ending, Plant, Rows, Scanning
+from antdrive.sim.driving.parts import Ending, Plant, Rows
 from antdrive.sim.driving.senses import Senses
+from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.log.ending import arrived, control_periods, outcome_at
 from antdrive.sim.log.outcome import Outcome
 
@@ -24,24 +24,21 @@ class Observation(NamedTuple):
     """What a robot knows in one control period."""
 
     tick: int  # the number of the control period
-    estimate: Pose  # estimated pose
-    pose: Pose  # estimated pose when the next command takes effect
+    pose: Pose  # estimated pose
+    pending: tuple[Twist, ...]  # the commands that have not reached the motors yet, oldest first
     twist: Twist  # measured speed and yaw rate
+    scan: Floats | None = None  # ranges of a scan (beams,) [m]; None if none was due
 
 
 class Note(NamedTuple):
     """What a robot tells of a command."""
 
+    pose: Pose | None = None  # the pose in which it believes, such as one corrected by a scan; None: as observed
     limiter: int = 0  # the rule that limited the speed, an index into the record's `limiters`
     ending: Ending | None = None  # why it gives up: at once without a command, else after the control period
 
 
 SILENT = Note()
-
-
-def no_scan(tick: int, pose: Pose, estimate: Pose) -> Pose:
-    """Return the estimate unchanged, for a robot without scans."""
-    return estimate
 
 
 class Body:
@@ -50,7 +47,7 @@ class Body:
     Attributes:
         tick: the number of the control period
         ended: how the drive ended; None while it goes on
-        estimates: the estimated pose of each control period so far
+        estimates: the pose in which the robot believed in each control period so far
     """
 
     def __init__(
@@ -58,14 +55,14 @@ class Body:
         plant: Plant,
         senses: Senses,
         localiser: Exact,
-        scan: Scanning = no_scan,
+        lidar: SimulatedLidar | None = None,
         *,
         hz: int,  # control periods per second
         limit: float,  # time limit [s]
         task: Task | None = None,  # where the drive ends; None: nowhere
     ) -> None:
-        self._plant, self._senses, self._localiser, self._scan, self._task = plant, senses, localiser, scan, task
-        self._periods, self._period = control_periods(limit, hz), 1 / hz
+        self._plant, self._senses, self._localiser, self._lidar, self._task = plant, senses, localiser, lidar, task
+        self._periods = control_periods(limit, hz)
         self.estimates: list[Pose] = []
         self._command = Twist(0.0, 0.0)  # in force
         self._now: Observation | None = None
@@ -76,19 +73,19 @@ class Body:
         """Return what the robot observes in this control period."""
         if self._now is None:
             state = self._plant.state
-            estimate = self._scan(self.tick, state.pose, self._localiser.update(*self._senses.read(state)))
-            self._localiser.pose = pose = estimate
-            self.estimates.append(estimate)
-            for command in self._senses.pending:
-                pose = moved(pose, command, self._period)
-            self._now = Observation(self.tick, estimate, pose, Twist(state.speed, state.yaw_rate))
+            pose = self._localiser.update(*self._senses.read(state))
+            scan = self._lidar.scan(self.tick, state.pose) if self._lidar else None
+            twist = Twist(state.speed, state.yaw_rate)
+            self._now = Observation(self.tick, pose, tuple(self._senses.pending), twist, scan)
         return self._now
 
     def step(self, command: Twist | None, note: Note = SILENT) -> None:
         """Drive for one control period; without a command, or at the goal, the drive ends where the robot stands."""
         now = self.observe()
-        if self._arrived(now) or (command is None and note.ending is None):
-            self.ended = self._judged(now.estimate)
+        believed = self._localiser.pose = note.pose or now.pose
+        self.estimates.append(believed)
+        if self._arrived(believed, now.twist) or (command is None and note.ending is None):
+            self.ended = self._judged(believed)
             return
         if command is None:
             self.ended = note.ending
@@ -101,10 +98,13 @@ class Body:
             self.ended = self._timed_out()
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
-        """Return the estimates and the motor targets of a robot with noise; the error of an estimate stays constant within a
-        control period."""
+        """Return the scans, and for a robot with noise the estimates and the motor targets.
+
+        The error of an estimate stays constant within a control period.
+        """
+        scans = self._lidar.logged(log, per_tick) if self._lidar else {}
         if not self._senses.noisy:
-            return {}
+            return scans
         errors = [
             (x - true_x, y - true_y, math.remainder(yaw - true_yaw, 2 * math.pi))
             for (x, y, yaw), (true_x, true_y, true_yaw) in zip(
@@ -112,14 +112,14 @@ class Body:
             )
         ]
         period = np.minimum(np.arange(len(log.t)) // per_tick, max(len(errors) - 1, 0))
-        return {"estimate": log.pose + np.array(errors or [(0.0, 0.0, 0.0)])[period], "actuated": log.actuated}
+        return scans | {"estimate": log.pose + np.array(errors or [(0.0, 0.0, 0.0)])[period], "actuated": log.actuated}
 
-    def _arrived(self, now: Observation) -> bool:
+    def _arrived(self, believed: Pose, twist: Twist) -> bool:
         """Return whether the robot stands at the goal by its estimate, once it has had a command."""
         task = self._task
         if task is None or not self.tick:
             return False
-        return arrived(now.estimate, now.twist, self._command, task.goal, task.goal_tolerance)
+        return arrived(believed, twist, self._command, task.goal, task.goal_tolerance)
 
     def _timed_out(self) -> Ending | None:
         return Ending(Outcome.TIMED_OUT) if self.tick >= self._periods else None

@@ -8,12 +8,14 @@ from typing import NamedTuple
 
 from antdrive.base import Pose
 from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, Twist
-from antdrive.sim.driving.body import SILENT, Body, Note, Observation
+from antdrive.robots.noise import moved_by
+from antdrive.sim.driving.body import Body, Note, Observation
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import Ending, Guide, Moment, Rule, Step
 from antdrive.sim.driving.plants import Bullet, Drive
 from antdrive.sim.driving.rules import SIGHT_LIMIT, WAITING_SPEED, Pursuit
 from antdrive.sim.driving.senses import Senses
+from antdrive.sim.driving.survey import Scans
 from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME, arrived, stopped
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine
@@ -66,11 +68,18 @@ class Driver:
     """
 
     def __init__(
-        self, guide: Guide, rules: Sequence[Rule], path: TrackedPath, task: Task, robot: RobotSpec, hz: int
+        self,
+        guide: Guide,
+        rules: Sequence[Rule],
+        path: TrackedPath,
+        task: Task,
+        robot: RobotSpec,
+        hz: int,
+        scans: Scans | None = None,
     ) -> None:
         self.path, self.step = path, Step()
         self._guide, self._rules, self._task, self._hz = guide, tuple(rules), task, hz
-        self._clock = StuckClock()
+        self._scans, self._clock = scans, StuckClock()
         self._patience = round(STUCK_TIME * hz)
         self._full_turn = full_turn(robot, hz)
         self.progress_periods = hz // PROGRESS_HZ or 1
@@ -82,17 +91,21 @@ class Driver:
 
     def act(self, now: Observation) -> tuple[Twist | None, Note]:
         """Return the command of one control period, None to stay where the robot stands, and a note on it."""
-        guide, task, before, pose = self._guide, self._task, self.step, now.pose
-        if now.tick and arrived(now.estimate, now.twist, before.command, task.goal, task.goal_tolerance):
-            return None, SILENT
+        guide, task, before, believed = self._guide, self._task, self.step, now.pose
+        if now.scan is not None and self._scans is not None:
+            believed = self._scans.read(now.tick, believed, now.scan)
+        silent = Note(believed)
+        if now.tick and arrived(believed, now.twist, before.command, task.goal, task.goal_tolerance):
+            return None, silent
+        pose = moved_by(believed, now.pending, 1 / self._hz)
         waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
         trigger = guide.trigger(now.tick, pose, waiting, self.path, before.pursuit.arc)
         if trigger:
             self._follow(guide.replan(now.tick, pose, trigger))
         if guide.plan_error:
-            return None, self._invalid_plan(now.tick)
+            return None, silent._replace(ending=self._invalid_plan(now.tick))
         if guide.blocked:
-            return None, Note(ending=Ending(Outcome.BLOCKED, guide.blocked))
+            return None, silent._replace(ending=Ending(Outcome.BLOCKED, guide.blocked))
         self.path = guide.refreshed(self.path, pose)
         moment, step = Moment(now.tick, pose, self.path, self.step, self._clock), self.step
         for rule in self._rules:
@@ -101,9 +114,9 @@ class Driver:
         if self._at_end_of_route(pose, now.twist, before.command) and not (
             self._follow(guide.missed(now.tick, pose)) or guide.may_wait
         ):
-            return None, self._invalid_plan(now.tick) if guide.plan_error else SILENT
+            return None, silent._replace(ending=self._invalid_plan(now.tick) if guide.plan_error else None)
         self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scan_turning)
-        return step.command, Note(step.pursuit.limiter, self._gives_up())
+        return step.command, Note(believed, step.pursuit.limiter, self._gives_up())
 
     def _gives_up(self) -> Ending | None:
         """End the drive of a robot without progress. Turning on the spot adds the time of a full turn to the limit."""
@@ -134,10 +147,9 @@ class Driver:
             return False
         return math.dist(pose[:2], task.goal) > task.goal_tolerance
 
-    def _invalid_plan(self, tick: int) -> Note:
-        """Return the note on an invalid plan, which ends the drive."""
-        reason = f"on the way, at t = {tick / self._hz:g} s: {self._guide.plan_error}"
-        return Note(ending=Ending(Outcome.INVALID_PLAN, reason))
+    def _invalid_plan(self, tick: int) -> Ending:
+        """Return the ending after an invalid plan."""
+        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.plan_error}")
 
 
 def drive(body: Body, driver: Driver, progress: Progress = ignore_progress) -> Ending:

@@ -7,8 +7,7 @@ and may correct the estimate, the guide provides the path, the rules compute the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -89,10 +88,6 @@ class Logs(Protocol):
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
         """Return arrays by their names in `Rollout`; `per_tick` is the number of rows per control period."""
-
-
-#: Callback that scans from the true pose if a scan is due; returns the estimate, possibly corrected.
-Scanning: TypeAlias = Callable[[int, Pose, Pose], Pose]
 
 
 class Guide(Protocol):

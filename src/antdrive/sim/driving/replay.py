@@ -21,11 +21,13 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots import Twist
-from antdrive.sim.driving.body import Body, no_scan
+from antdrive.robots.noise import moved_by
+from antdrive.sim.driving.body import Body, Note
 from antdrive.sim.driving.localising import Exact, logged_senses
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.driving.senses import Senses
-from antdrive.sim.driving.survey import MoverTracking, Scans, SimulatedLidar, Survey, reset_ticks
+from antdrive.sim.driving.simulated_lidar import SimulatedLidar
+from antdrive.sim.driving.survey import MoverTracking, Survey, reset_ticks, turning_room
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine, State
@@ -109,25 +111,26 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
     per_tick = record.rows_per_period
     # A period's first row is the last row of the previous period; a contact ends control.
     rows = range(0, min(rollout.first_contact, len(rollout.t) - 1), per_tick)
-    scans, resets = scans_of(rollout)
+    lidar, scans, resets = scans_of(rollout)
     plant = Logged(rollout)
     body = Body(
         plant,
         senses,
         localiser,
-        scans.scan if scans else no_scan,
+        lidar,
         hz=record.control_hz,
         limit=(len(rows) + 1) / record.control_hz,
     )
     for tick, row in enumerate(rows):
-        pose = body.observe().pose
+        now = body.observe()
+        pose = now.pose if now.scan is None or scans is None else scans.read(tick, now.pose, now.scan)
         if tick in resets:
-            resets[tick](pose)
-        body.step(Twist(*rollout.command[row + 1].tolist()))
+            resets[tick](moved_by(pose, now.pending, 1 / record.control_hz))
+        body.step(Twist(*rollout.command[row + 1].tolist()), Note(pose))
     if _decided_at_the_end(rollout, per_tick):
         body.observe()
-    if scans:
-        yield from _other_scans(rollout, **scans.logged(rollout, per_tick))
+    if lidar:
+        yield from _other_scans(rollout, **lidar.logged(rollout, per_tick))
     if not senses.noisy or not rows:
         return
     off = np.array(body.estimates[: len(rows)]) - rollout.estimate[rows]
@@ -168,20 +171,24 @@ class Logged:
         return State(*self._rollout.pose[self._row].tolist(), *self._rollout.twist[self._row].tolist())
 
 
-def scans_of(rollout: Rollout) -> tuple[Scans | None, Mapping[int, Callable[[Pose], None]]]:
-    """Return the lidar that repeats a log's scans, if there are any, and the resets of the map by control period."""
-    record, lidar = rollout.record, rollout.record.robot.lidar
+def scans_of(
+    rollout: Rollout,
+) -> tuple[SimulatedLidar | None, Survey | None, Mapping[int, Callable[[Pose], None]]]:
+    """Return the lidar that repeats a log's scans, if there are any, the map of a mapless robot, and its resets by period."""
+    record, spec = rollout.record, rollout.record.robot.lidar
     if not len(rollout.scans):
-        return None, {}
-    assert lidar is not None
-    hz, noisy = record.control_hz, record.noise > 0
-    sensor = SimulatedLidar.of(lidar, record.world, rollout.trajectories(), seed=record.seed, noisy=noisy, hz=hz)
+        return None, None, {}
+    assert spec is not None
+    hz, noisy, task = record.control_hz, record.noise > 0, record.task
+    lidar = SimulatedLidar.of(spec, record.world, rollout.trajectories(), seed=record.seed, noisy=noisy, hz=hz)
     if not record.exploring:
-        return Scans(sensor), {}
+        return lidar, None, {}
     tracks_movers = record.perception is not None and record.perception.kind == "lidar"
-    tracking, matching = MoverTracking(lidar, hz) if tracks_movers else None, logged_senses(record)[1].matched
-    survey = Survey.of(record.robot, record.task, sensor, matching=matching, tracking=tracking)
-    return survey, dict.fromkeys(reset_ticks(record), survey.reset)
+    tracking = MoverTracking(spec, hz) if tracks_movers else None
+    matching = logged_senses(record)[1].matched and (tracks_movers or not task.world.movers)
+    sight = lidar.first(task.start, turning_room(record.robot.radius))
+    survey = Survey(record.robot, task.start, task.goal, hz, sight, matching=matching, tracking=tracking)
+    return lidar, survey, dict.fromkeys(reset_ticks(record), survey.reset)
 
 
 def _decided_at_the_end(rollout: Rollout, per_tick: int) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,15 +15,13 @@ from antdrive.robots import RobotSpec, Twist
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.parts import Rows
+from antdrive.sim.driving.simulated_lidar import FirstSight
 from antdrive.sim.log.record import DriveRecord
-from antdrive.sim.log.rollout import scans_logged
-from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import SCANNED
 from antdrive.sim.sensing.mapping import OccupancyMap, clear_way, shape_of
 from antdrive.sim.sensing.matching import FAR, ScanMatcher, without_sliding
-from antdrive.sim.sensing.scanner import Scanner
 from antdrive.sim.sensing.tracking import Ground, MappedGround, MoverTracker, TrackedMovers, ends
-from antdrive.worlds import Route, Task, Trajectories, World
+from antdrive.worlds import Route, World
 
 MAP_CELL = 0.05  # side of the map's cells [m]
 HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # range up to which hits enter the map [m]
@@ -168,67 +165,20 @@ class Scan(NamedTuple):
     movers: npt.NDArray[np.bool_] | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class SimulatedLidar:
-    """Simulated lidar in the true world."""
-
-    scanner: Scanner  # ray casting in the true world
-    world: World  # the static obstacles
-    trajectories: Trajectories | None  # true motions of the movers; None without movers
-    rng: np.random.Generator | None  # source of range noise; None for no noise
-    hz: int  # control periods per second
-
-    @classmethod
-    def of(
-        cls, lidar: Lidar, world: World, trajectories: Trajectories, *, seed: int, noisy: bool, hz: int
-    ) -> SimulatedLidar:
-        """Create a lidar in a world, with noise from a drive's seed and at most one scan per control period."""
-        rng = random_stream(seed, "lidar") if noisy else None
-        return cls(Scanner.of(lidar.at(hz), world), world, trajectories or None, rng, hz)
-
-    @property
-    def movers_at_start(self) -> Floats | None:
-        """Positions of the movers at time 0, as discs (M, 3): x, y, radius [m]; None without movers."""
-        movers = self.trajectories
-        return np.column_stack((movers.positions(np.zeros(1))[0], movers.radii)) if movers else None
-
-    def due(self, tick: int, last: int) -> bool:
-        """Return whether a scan is due in a control period. `last` is the period of the latest scan; negative: none yet."""
-        return last < 0 or (tick != last and self.scanner.lidar.due(tick, self.hz))
-
-    def ranges(self, tick: int, pose: Pose) -> Floats:
-        """Return a scan (beams,) [m]."""
-        movers = self.trajectories
-        if not movers:
-            return self.scanner.scan(pose, rng=self.rng)
-        return self.scanner.scan(pose, movers.positions(np.array([tick / self.hz]))[0], movers.radii, self.rng)
-
-
 class Scans:
-    """Scans of a drive. Only their ranges depend on the true poses and the true world.
+    """Scans of a drive, at their estimated poses.
 
     Attributes:
         scans: all scans so far
     """
 
-    def __init__(self, sensor: SimulatedLidar) -> None:
+    def __init__(self) -> None:
         self.scans: list[Scan] = []
-        self._sensor = sensor
-
-    def scan(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
-        """Scan from the true pose if a scan is due; return the estimate, possibly corrected by the scan."""
-        if not self._sensor.due(tick, self.scans[-1].tick if self.scans else -1):
-            return estimate
-        return self.read(tick, estimate, self._sensor.ranges(tick, pose))
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
-        """Store a scan; return the estimate unchanged."""
+        """Store a scan; return the estimate, possibly corrected by the scan."""
         self.scans.append(Scan(tick, estimate, ranges))
         return estimate
-
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
-        """Return the log's arrays of scans."""
-        return scans_logged(((scan.tick, scan.ranges) for scan in self.scans), per_tick, len(log.t))
 
 
 class MoverDetector(Scans):
@@ -238,8 +188,8 @@ class MoverDetector(Scans):
         tracking: the tracks of the movers
     """
 
-    def __init__(self, sensor: SimulatedLidar, ground: Ground, tracking: MoverTracking) -> None:
-        super().__init__(sensor)
+    def __init__(self, ground: Ground, tracking: MoverTracking) -> None:
+        super().__init__()
         self.tracking, self._ground = tracking, ground
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
@@ -251,28 +201,38 @@ class MoverDetector(Scans):
 class Survey(Scans):
     """Mapping for a mapless robot.
 
-    True poses and the true world are used only for scan ranges, with one exception: at the start, the free ground within the
-    robot's turning circle is given.
+    At the start, the free ground within the robot's turning circle is given.
 
     Attributes:
         lidar: the lidar
         map: the occupancy map
         whole: number of scans entered as a whole, with their free ground
         tracking: the mover tracker; None without tracking
+
+    Args:
+        robot: the robot; it has a lidar
+        start: the start pose
+        goal: the goal [m]
+        hz: control periods per second
+        sight: what it is given at its start; None: nothing
+        matching: whether to correct estimates by scan matching
+        tracking: the mover tracker; None without tracking
     """
 
     def __init__(
         self,
-        sensor: SimulatedLidar,
         robot: RobotSpec,
         start: Pose,
         goal: Point,
+        hz: int,
+        sight: FirstSight | None = None,
         *,
         matching: bool = False,
         tracking: MoverTracking | None = None,
     ) -> None:
-        super().__init__(sensor)
-        self.lidar = sensor.scanner.lidar
+        super().__init__()
+        assert robot.lidar is not None
+        self.lidar = robot.lidar.at(hz)
         foot = robot.footprint
         self._shape = shape_of(dataclasses.replace(foot, rounding=foot.rounding + PAD))
         self._turning_room = turning_room(robot.radius)
@@ -281,20 +241,12 @@ class Survey(Scans):
         moving = tracking is not None
         horizon = horizon_of(tracks_movers=moving)
         self.map = OccupancyMap(self.lidar, MAP_CELL, start[:2], horizon, goal=goal, moving=moving)
-        self.map.mark_free(start[:2], self._turning_room, sensor.world, sensor.movers_at_start)
+        self.map.mark_free(start[:2], self._turning_room, sight.ground if sight else None)
         self._recent = math.ceil(RECENT * self.lidar.rate)
-        matches = matching and (moving or sensor.trajectories is None)  # movers without tracks would shift the match
-        self._matcher = ScanMatcher(self.lidar, FAR_AMONG_MOVERS if moving else FAR) if matches else None
+        self._matcher = ScanMatcher(self.lidar, FAR_AMONG_MOVERS if moving else FAR) if matching else None
         self.whole = 0
-
-    @classmethod
-    def of(
-        cls, robot: RobotSpec, task: Task, sensor: SimulatedLidar, *, matching: bool, tracking: MoverTracking | None
-    ) -> Survey:
-        """Create the survey of a drive, with the first scan from the start."""
-        survey = cls(sensor, robot, task.start, task.goal, matching=matching, tracking=tracking)
-        survey.scan(0, task.start, task.start)
-        return survey
+        if sight is not None:
+            self.read(0, start, sight.ranges)
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
         """Enter a scan in the map; return the estimate, possibly corrected by scan matching."""
