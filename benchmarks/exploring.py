@@ -27,7 +27,7 @@ import numpy as np
 
 from antdrive.sim import Scenario, run
 from antdrive.sim.driving.body import Body
-from antdrive.sim.driving.drive import Driver
+from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.sensing import OccupancyMap, Scanner

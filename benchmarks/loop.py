@@ -30,9 +30,11 @@ import numpy as np
 from antdrive.robots import Avoidance, PurePursuit, TrackedPath, load_robot
 from antdrive.sim import Perception, Scenario, run
 from antdrive.sim.driving.body import Body
-from antdrive.sim.driving.drive import Driver, OnePath, follow
+from antdrive.sim.driving.drive import follow
+from antdrive.sim.driving.driver import Driver, OnePath
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.perceived_movers import GroundTruth
+from antdrive.sim.driving.mover_sense import MoverSense
+from antdrive.sim.driving.perceived_movers import Given
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.driving.replanning import Replanning
 from antdrive.sim.driving.rules import Avoid
@@ -99,11 +101,13 @@ def table_of_movers(route: Route, rounds: int) -> None:
                 (f"{MOVERS} movers, not seen", full, moving),
                 (f"{MOVERS} movers, avoided", full, moving),
             ):
-                told = GroundTruth(motions, Perception(), 60)
+                told, sense = Given(Perception(), 60, len(motions)), MoverSense(motions, Perception(), 60)
                 avoid = Avoid(Avoidance(), told, OnePath(), task, robot, 60)
                 started = time.process_time()
                 rules = [avoid] if name.endswith("avoided") else []
-                log = follow(engine, controller, tracked, task, limit=30, rules=rules)
+                log = follow(
+                    engine, controller, tracked, task, limit=30, rules=rules, movers=(sense, told) if rules else None
+                )
                 if turn:
                     costs.setdefault(name, []).append((time.process_time() - started) / (len(log.t) - 1) * 1e6)
     print("\nloop                     us/step   / no movers")

@@ -79,6 +79,29 @@ def test_imports_have_no_circles():
     TopologicalSorter(folders).prepare()
 
 
+#: What knows the truth: the body of a robot, and what drives one.
+BODY = {
+    "body",
+    "drive",
+    "leaving",
+    "mover_sense",
+    "odometry",
+    "plants",
+    "replay",
+    "routes",
+    "senses",
+    "simulated_lidar",
+}
+
+
+def test_a_mind_imports_neither_physics_nor_what_is_true():
+    """`routes` rehearses a narrow start in the robot's map."""
+    for path in (ROOT / "sim" / "driving").glob("*.py"):
+        names = imported(path) if path.stem not in BODY else set()
+        assert not {name for name in names if "physics" in name or name.endswith("Trajectories")}, path
+        assert not {f"antdrive.sim.driving.{body}" for body in BODY - {"routes"}} & names, path
+
+
 def test_pybullet_is_imported_by_one_module_and_numba_by_kernels():
     assert [path.name for path in MODULES if "pybullet" in imported(path)] == ["bullet.py"]
     assert all(path.name.startswith("_kernels") for path in MODULES if "numba" in imported(path))

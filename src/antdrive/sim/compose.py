@@ -12,24 +12,17 @@ from typing import NamedTuple
 from antdrive.robots import LIMITERS, Avoidance
 from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
-from antdrive.sim.driving.drive import full_turn
+from antdrive.sim.driving.driver import full_turn
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import Exact, localiser_of
+from antdrive.sim.driving.mover_sense import MoverSense
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import Logs, RouteGuide, Rule
-from antdrive.sim.driving.perceived_movers import GroundTruth, PerceivedMovers, Tracked
+from antdrive.sim.driving.parts import EXPLORING_LIMITERS, Logs, RouteGuide, Rule
+from antdrive.sim.driving.perceived_movers import Given, PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
-from antdrive.sim.driving.rules import (
-    EXPLORING_LIMITERS,
-    GOAL_SHARE,
-    Avoid,
-    KeepToSchedule,
-    Pursuit,
-    SlowAtCorners,
-    TurnToScan,
-)
+from antdrive.sim.driving.rules import GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, SlowAtCorners, TurnToScan
 from antdrive.sim.driving.senses import Senses, senses_of
 from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
@@ -51,7 +44,9 @@ class Parts(NamedTuple):
     senses: Senses
     localiser: Exact
     lidar: SimulatedLidar | None
+    movers: MoverSense | None
     scans: Scans | None
+    given: Given
     guide: RouteGuide
     rules: tuple[Rule, ...]  # in order of application
     logs: tuple[Logs, ...]
@@ -72,9 +67,8 @@ def compose(s: Scenario) -> Parts:
     survey = _survey(s, lidar, tracks_movers, matching=localiser.matched) if lidar and not mapped else None
     scans = _mover_detector(s) if mapped and tracks_movers else survey
     tracking = scans.tracking if scans else None
-    movers: PerceivedMovers = (
-        Tracked(tracking, perception, hz) if tracking else GroundTruth(s.trajectories, perception, hz)
-    )
+    given = _given(s)
+    movers: PerceivedMovers = Tracked(tracking, perception, hz) if tracking else given
     # A scan may be one scan period old, and commands are delayed.
     reaction = 1 / hz + (1 / _lidar(s).rate if scans else 0.0) + s.robot.noise.scaled(s.noise).delay
     rules: list[Rule] = [Pursuit(s.controller, full_turn(s.robot, hz))]
@@ -107,7 +101,9 @@ def compose(s: Scenario) -> Parts:
         senses,
         localiser,
         lidar,
+        MoverSense(s.trajectories, perception, hz) if moving and not tracking else None,
         scans,
+        given,
         guide,
         tuple(rules),
         tuple(part for part in (guide, tracking) if part is not None),
@@ -196,6 +192,13 @@ def _mover_detector(s: Scenario) -> MoverDetector:
     errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
     ground = KnownGround(lidar, s.task.world, math.inf, *errors)
     return MoverDetector(ground, MoverTracking(lidar, s.control_hz, *errors))
+
+
+def _given(s: Scenario) -> Given:
+    """Create the robot's knowledge of movers that it is given."""
+    perception, trajectories = perception_of(s), s.trajectories
+    motions = trajectories.positions if perception.kind == "motions" else None
+    return Given(perception, s.control_hz, len(trajectories), motions)
 
 
 def _lidar(s: Scenario) -> Lidar:

@@ -13,7 +13,8 @@ from antdrive.base.version import require_physics
 from antdrive.planners import PlanResult, PlanStatus
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.body import Body
-from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
+from antdrive.sim.driving.drive import Progress, drive, ignore_progress
+from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.facts import LoggedRun, result_of
 from antdrive.sim.log.certificate import Certificate, certify
@@ -177,10 +178,12 @@ def driven(
     route, path = parts.guide.route(grid, answer)
     limit = s.time_limit or s.task.time_limit or usual_time_limit(route.length, s.robot, s.noise)
     started = time.perf_counter()
-    driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz, parts.scans)
+    driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz, parts.scans, parts.given)
     with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories) as engine:
         plant = Bullet(engine, s.task.start, s.control_hz)
-        body = Body(plant, parts.senses, parts.localiser, parts.lidar, hz=s.control_hz, limit=limit, task=s.task)
+        body = Body(
+            plant, parts.senses, parts.localiser, parts.lidar, parts.movers, hz=s.control_hz, limit=limit, task=s.task
+        )
         log = plant.finish(drive(body, driver, progress))
     parts = parts._replace(logs=(body, *parts.logs))
     return grid, answer, rollout_of(s, parts, grid, answer, route, log, limit, time.perf_counter() - started)

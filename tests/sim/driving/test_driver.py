@@ -19,15 +19,15 @@ from antdrive.robots.noise import moved_by
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
 from antdrive.sim.driving.blockage import blocked_cells, covered_discs
-from antdrive.sim.driving.body import SILENT, Body, Note, Observation
-from antdrive.sim.driving.drive import STUCK_PROGRESS, STUCK_TIME, Driver, OnePath, StuckClock, drive, follow, full_turn
+from antdrive.sim.driving.body import Body
+from antdrive.sim.driving.drive import drive, follow
+from antdrive.sim.driving.driver import Driver, OnePath, full_turn
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import Ending, Guide, Moment, Step
-from antdrive.sim.driving.perceived_movers import GroundTruth
+from antdrive.sim.driving.observation import SILENT, Note, Observation
+from antdrive.sim.driving.parts import SIGHT_LIMIT, Ending, Guide, Moment, Step, StuckClock
 from antdrive.sim.driving.plants import Bullet, Kinematic
 from antdrive.sim.driving.rules import (
     AVOIDING,
-    SIGHT_LIMIT,
     WAITING_SPEED,
     Avoid,
     KeepToSchedule,
@@ -40,9 +40,11 @@ from antdrive.sim.driving.rules import (
 )
 from antdrive.sim.driving.senses import NoisySenses, Senses
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
+from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, rasterise
 from tests.records import changed
+from tests.sim.driving.ground_truth import GroundTruth
 
 HALL = World("hall", (0.0, 0.0, 9.0, 6.0), (Disc(4.5, 4.5, 0.5),))
 CRUISING = Cruising(radius=0.3, position=(7.0, 1.0), velocity=(0.0, 0.1))

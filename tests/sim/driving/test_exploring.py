@@ -16,14 +16,13 @@ from antdrive.robots.default_margin import SQUEEZED, TURNABLE
 from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, check, near_polyline, point_at, surrounding
-from antdrive.sim.driving.body import Observation
-from antdrive.sim.driving.drive import Driver
+from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import INTERVAL
+from antdrive.sim.driving.observation import FirstSight, Observation
 from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import IDLE_TIME, Recovery, ScanTurn
 from antdrive.sim.driving.replay import replay, scans_of
 from antdrive.sim.driving.routes import RoutePlanner, bounds_of
-from antdrive.sim.driving.simulated_lidar import FirstSight
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverTracking, Survey, reset_ticks
 from antdrive.sim.log.record import ReplanRecord

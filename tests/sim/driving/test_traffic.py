@@ -23,11 +23,12 @@ from antdrive.sim.driving.movers_ahead import (
     Traffic,
     Zone,
 )
-from antdrive.sim.driving.perceived_movers import GroundTruth, Tracked
+from antdrive.sim.driving.perceived_movers import Tracked
 from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.sensing import TrackedMovers
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, import_dynabarn, rasterise
 from tests.records import COARSE, changed
+from tests.sim.driving.ground_truth import GroundTruth
 from tools.shared_data import DYNABARN
 
 HALL = World("hall", (0.0, 0.0, 16.0, 12.0))

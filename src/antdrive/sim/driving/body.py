@@ -3,42 +3,37 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from antdrive.base import Floats, Pose
+from antdrive.base import Pose
 from antdrive.robots import Twist
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import Ending, Plant, Rows
+from antdrive.sim.driving.mover_sense import MoverSense
+from antdrive.sim.driving.observation import NOBODY, SILENT, Note, Observation
+from antdrive.sim.driving.parts import Ending, Rows
 from antdrive.sim.driving.senses import Senses
 from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.log.ending import arrived, control_periods, outcome_at
 from antdrive.sim.log.outcome import Outcome
 
 if TYPE_CHECKING:
+    from antdrive.sim.physics.engine import State
     from antdrive.worlds import Task
 
 
-class Observation(NamedTuple):
-    """What a robot knows in one control period."""
+class Plant(Protocol):
+    """Robot that executes twists: in physics (`Bullet`), exactly (`Kinematic`), or from a log (`Logged`)."""
 
-    tick: int  # the number of the control period
-    pose: Pose  # estimated pose
-    pending: tuple[Twist, ...]  # the commands that have not reached the motors yet, oldest first
-    twist: Twist  # measured speed and yaw rate
-    scan: Floats | None = None  # ranges of a scan (beams,) [m]; None if none was due
+    state: State  # true pose and velocity
 
+    @property
+    def touched(self) -> bool:
+        """Whether the robot has touched anything so far."""
 
-class Note(NamedTuple):
-    """What a robot tells of a command."""
-
-    pose: Pose | None = None  # the pose in which it believes, such as one corrected by a scan; None: as observed
-    limiter: int = 0  # the rule that limited the speed, an index into the record's `limiters`
-    ending: Ending | None = None  # why it gives up: at once without a command, else after the control period
-
-
-SILENT = Note()
+    def advance(self, command: Twist, actuated: Twist, limiter: int = 0) -> None:
+        """Drive for one control period with the given motor targets; the command and its limiter are for the log."""
 
 
 class Body:
@@ -56,13 +51,14 @@ class Body:
         senses: Senses,
         localiser: Exact,
         lidar: SimulatedLidar | None = None,
+        movers: MoverSense | None = None,
         *,
         hz: int,  # control periods per second
         limit: float,  # time limit [s]
         task: Task | None = None,  # where the drive ends; None: nowhere
     ) -> None:
         self._plant, self._senses, self._localiser, self._lidar, self._task = plant, senses, localiser, lidar, task
-        self._periods = control_periods(limit, hz)
+        self._movers, self._periods = movers, control_periods(limit, hz)
         self.estimates: list[Pose] = []
         self._command = Twist(0.0, 0.0)  # in force
         self._now: Observation | None = None
@@ -75,8 +71,9 @@ class Body:
             state = self._plant.state
             pose = self._localiser.update(*self._senses.read(state))
             scan = self._lidar.scan(self.tick, state.pose) if self._lidar else None
-            twist = Twist(state.speed, state.yaw_rate)
-            self._now = Observation(self.tick, pose, tuple(self._senses.pending), twist, scan)
+            twist, pending = Twist(state.speed, state.yaw_rate), tuple(self._senses.pending)
+            movers = self._movers.read(self.tick, pose[:2]) if self._movers else NOBODY
+            self._now = Observation(self.tick, pose, pending, twist, scan, movers)
         return self._now
 
     def step(self, command: Twist | None, note: Note = SILENT) -> None:

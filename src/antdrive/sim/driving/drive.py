@@ -1,155 +1,28 @@
-"""Driver and drive loop: follow the guide, apply the rules, arrive or give up."""
+"""The drive loop, and drives along one path."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
-from antdrive.base import Pose
-from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, Twist
-from antdrive.robots.noise import moved_by
-from antdrive.sim.driving.body import Body, Note, Observation
+from antdrive.robots import PurePursuit, TrackedPath
+from antdrive.sim.driving.body import Body
+from antdrive.sim.driving.driver import Driver, OnePath, full_turn
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import Ending, Guide, Moment, Rule, Step
+from antdrive.sim.driving.mover_sense import MoverSense
+from antdrive.sim.driving.parts import Ending, Rule
+from antdrive.sim.driving.perceived_movers import Given
 from antdrive.sim.driving.plants import Bullet, Drive
-from antdrive.sim.driving.rules import SIGHT_LIMIT, WAITING_SPEED, Pursuit
+from antdrive.sim.driving.rules import Pursuit
 from antdrive.sim.driving.senses import Senses
-from antdrive.sim.driving.survey import Scans
-from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME, arrived, stopped
-from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Task
 
-PROGRESS_HZ = 10  # calls of `progress` per simulated second
 #: Progress callback, called with the completed fraction of the route.
 Progress = Callable[[float], None]
 
 
 def ignore_progress(fraction: float) -> None:
     """Ignore the progress of a drive."""
-
-
-class StuckClock(NamedTuple):
-    """Time without progress along the route. Waiting for a mover does not count."""
-
-    farthest: float = 0.0  # farthest arc length that the robot has reached [m]
-    driving: int = 0  # control periods since then with a driving command
-    turning: int = 0  # control periods since then with a turn on the spot
-    held: int = 0  # number of these periods limited by the stopping constraint
-
-    def after(self, pursuit: PursuitState, waiting: bool) -> StuckClock:
-        """Return the clock after one more control period."""
-        if pursuit.arc > self.farthest + STUCK_PROGRESS:
-            return StuckClock(pursuit.arc)
-        if waiting:
-            return self
-        held = self.held + (pursuit.limiter == SIGHT_LIMIT)
-        if pursuit.turning:
-            return StuckClock(self.farthest, self.driving, self.turning + 1, held)
-        return StuckClock(self.farthest, self.driving + 1, self.turning, held)
-
-    @property
-    def reason(self) -> str:
-        """Reason for the outcome `STUCK`."""
-        why = f"no progress along the route for {STUCK_TIME:g} s"
-        if 2 * self.held > self.driving + self.turning:
-            return f"{why}; its sight held it: it had seen no free ground where it was to go"
-        return why
-
-
-class Driver:
-    """Mind that drives a robot along a path, one step per control period.
-
-    Attributes:
-        path: the current path
-        step: the current step
-        progress_periods: control periods between two reports of progress
-    """
-
-    def __init__(
-        self,
-        guide: Guide,
-        rules: Sequence[Rule],
-        path: TrackedPath,
-        task: Task,
-        robot: RobotSpec,
-        hz: int,
-        scans: Scans | None = None,
-    ) -> None:
-        self.path, self.step = path, Step()
-        self._guide, self._rules, self._task, self._hz = guide, tuple(rules), task, hz
-        self._scans, self._clock = scans, StuckClock()
-        self._patience = round(STUCK_TIME * hz)
-        self._full_turn = full_turn(robot, hz)
-        self.progress_periods = hz // PROGRESS_HZ or 1
-
-    @property
-    def fraction(self) -> float:
-        """Completed fraction of the route."""
-        return self.step.pursuit.arc / self.path.length
-
-    def act(self, now: Observation) -> tuple[Twist | None, Note]:
-        """Return the command of one control period, None to stay where the robot stands, and a note on it."""
-        guide, task, before, believed = self._guide, self._task, self.step, now.pose
-        if now.scan is not None and self._scans is not None:
-            believed = self._scans.read(now.tick, believed, now.scan)
-        silent = Note(believed)
-        if now.tick and arrived(believed, now.twist, before.command, task.goal, task.goal_tolerance):
-            return None, silent
-        pose = moved_by(believed, now.pending, 1 / self._hz)
-        waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
-        trigger = guide.trigger(now.tick, pose, waiting, self.path, before.pursuit.arc)
-        if trigger:
-            self._follow(guide.replan(now.tick, pose, trigger))
-        if guide.plan_error:
-            return None, silent._replace(ending=self._invalid_plan(now.tick))
-        if guide.blocked:
-            return None, silent._replace(ending=Ending(Outcome.BLOCKED, guide.blocked))
-        self.path = guide.refreshed(self.path, pose)
-        moment, step = Moment(now.tick, pose, self.path, self.step, self._clock), self.step
-        for rule in self._rules:
-            step = rule.apply(moment, step)
-        self.step = step
-        if self._at_end_of_route(pose, now.twist, before.command) and not (
-            self._follow(guide.missed(now.tick, pose)) or guide.may_wait
-        ):
-            return None, silent._replace(ending=self._invalid_plan(now.tick) if guide.plan_error else None)
-        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scan_turning)
-        return step.command, Note(believed, step.pursuit.limiter, self._gives_up())
-
-    def _gives_up(self) -> Ending | None:
-        """End the drive of a robot without progress. Turning on the spot adds the time of a full turn to the limit."""
-        clock = self._clock
-        if clock.driving < self._patience and clock.turning < self._patience + self._full_turn:
-            return None
-        return Ending(Outcome.STUCK, clock.reason)
-
-    def with_reason(self, ending: Ending, tick: int) -> Ending:
-        """Add the guide's failure note to the reason of a robot that got stuck or timed out."""
-        if ending.outcome not in (Outcome.STUCK, Outcome.TIMED_OUT):
-            return ending
-        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self._guide.failure_note(tick)))))
-
-    def _follow(self, path: TrackedPath | None) -> bool:
-        """Switch to a new path, and return whether there is one."""
-        if path is None:
-            return False
-        self.path = path
-        self.step = self.step._replace(pursuit=PursuitState(limiter=self.step.pursuit.limiter))
-        self._clock = self._clock._replace(farthest=0.0)
-        return True
-
-    def _at_end_of_route(self, pose: Pose, twist: Twist, last: Twist) -> bool:
-        """Return whether the robot stands at the end of its route, and not at the goal, where it arrives in the next period."""
-        path, (command, pursuit, *_), task = self.path, self.step, self._task
-        if path.length - pursuit.arc > path.goal_distance or any(command) or not stopped(twist, last):
-            return False
-        return math.dist(pose[:2], task.goal) > task.goal_tolerance
-
-    def _invalid_plan(self, tick: int) -> Ending:
-        """Return the ending after an invalid plan."""
-        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.plan_error}")
 
 
 def drive(body: Body, driver: Driver, progress: Progress = ignore_progress) -> Ending:
@@ -160,18 +33,6 @@ def drive(body: Body, driver: Driver, progress: Progress = ignore_progress) -> E
         if now.tick % driver.progress_periods == 0:
             progress(driver.fraction)
     return driver.with_reason(body.ended, body.tick)
-
-
-def full_turn(robot: RobotSpec, hz: int) -> int:
-    """Return the number of control periods of a full turn on the spot."""
-    return round(2 * math.pi / robot.max_yaw_rate * hz)
-
-
-class OnePath(Guide):
-    """Guide that keeps one path."""
-
-    def __init__(self) -> None:
-        self.log, self.walls = [], []
 
 
 def follow(
@@ -185,12 +46,14 @@ def follow(
     senses: Senses | None = None,
     localiser: Exact | None = None,
     rules: Sequence[Rule] = (),
+    movers: tuple[MoverSense, Given] | None = None,
     progress: Progress = ignore_progress,
 ) -> Drive:
     """Drive along a path from the start of a task, for at most `limit` [s]; `rules` apply after pursuit."""
     pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))
-    driver = Driver(OnePath(), (pursuit, *rules), path, task, engine.robot, control_hz)
+    sense, given = movers or (None, None)
+    driver = Driver(OnePath(), (pursuit, *rules), path, task, engine.robot, control_hz, given=given)
     plant = Bullet(engine, task.start, control_hz)
     localiser = localiser or Exact(task.start, 1 / control_hz)
-    body = Body(plant, senses or Senses(), localiser, hz=control_hz, limit=limit, task=task)
+    body = Body(plant, senses or Senses(), localiser, movers=sense, hz=control_hz, limit=limit, task=task)
     return plant.finish(drive(body, driver, progress))

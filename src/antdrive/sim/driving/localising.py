@@ -8,7 +8,6 @@ They know measurements alone, see `antdrive.sim.driving.senses`. To add one, wri
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,11 +15,7 @@ from antdrive.base import Floats, Pose
 from antdrive.robots import RobotSpec, Twist
 from antdrive.robots.noise import fix_gains, moved, steady_errors
 from antdrive.robots.spec import Noise, Odometry
-from antdrive.sim.driving.senses import Senses, senses_of
 from antdrive.sim.sensing.pose_filter import PoseFilter
-
-if TYPE_CHECKING:
-    from antdrive.sim.log.record import DriveRecord
 
 
 class Exact:
@@ -131,14 +126,3 @@ def localiser_of(
     if mapless:
         return Fused(start, period, levels, robot.track, Odometry().scaled(odometry))
     return Fixes(start, period, levels, robot.track)
-
-
-def logged_senses(record: DriveRecord) -> tuple[Senses, Exact]:
-    """Create the senses and the localiser of a logged drive."""
-    odometry = 1.0 if record.sensing is None else record.sensing.odometry
-    period, mapless = 1 / record.control_hz, record.exploring
-    levels = record.localisation, record.robot, record.noise, odometry, period
-    return (
-        senses_of(*levels, record.seed, mapless=mapless),
-        localiser_of(*levels, record.task.start, mapless=mapless),
-    )

@@ -54,7 +54,7 @@ def _rebuilt(rollout: Rollout) -> LoggedOdometry:
     The imports load compiled code, which tables of exact drives do not need.
     """
     from antdrive.robots.control.pursuit import Twist
-    from antdrive.sim.driving.localising import logged_senses
+    from antdrive.sim.driving.senses import logged_senses
     from antdrive.sim.physics.engine import State
     from antdrive.sim.sensing.pose_filter import PoseFilter
 

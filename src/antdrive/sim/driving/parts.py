@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from antdrive.base import Floats, Point, Pose
-from antdrive.robots import PursuitState, TrackedPath, Twist
+from antdrive.robots import LIMITERS, PursuitState, TrackedPath, Twist
+from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ReplanRecord, finite_or_none
 
 if TYPE_CHECKING:
     from antdrive.planners import PlanResult
-    from antdrive.sim.driving.drive import StuckClock
     from antdrive.sim.driving.rules import Schedule
-    from antdrive.sim.physics.engine import State
     from antdrive.worlds import Grid, Route
 
+EXPLORING_LIMITERS = (*LIMITERS, "sight")  # names of the limiting rules of a mapless robot
+SIGHT_LIMIT = EXPLORING_LIMITERS.index("sight")
 NO_ROUTE: Floats = np.empty((0, 2))
 
 
@@ -44,6 +45,34 @@ class Step(NamedTuple):
     waits: bool = False  # whether the robot waits on purpose, which does not count as being stuck
 
 
+class StuckClock(NamedTuple):
+    """Time without progress along the route. Waiting for a mover does not count."""
+
+    farthest: float = 0.0  # farthest arc length that the robot has reached [m]
+    driving: int = 0  # control periods since then with a driving command
+    turning: int = 0  # control periods since then with a turn on the spot
+    held: int = 0  # number of these periods limited by the stopping constraint
+
+    def after(self, pursuit: PursuitState, waiting: bool) -> StuckClock:
+        """Return the clock after one more control period."""
+        if pursuit.arc > self.farthest + STUCK_PROGRESS:
+            return StuckClock(pursuit.arc)
+        if waiting:
+            return self
+        held = self.held + (pursuit.limiter == SIGHT_LIMIT)
+        if pursuit.turning:
+            return StuckClock(self.farthest, self.driving, self.turning + 1, held)
+        return StuckClock(self.farthest, self.driving + 1, self.turning, held)
+
+    @property
+    def reason(self) -> str:
+        """Reason for the outcome `STUCK`."""
+        why = f"no progress along the route for {STUCK_TIME:g} s"
+        if 2 * self.held > self.driving + self.turning:
+            return f"{why}; its sight held it: it had seen no free ground where it was to go"
+        return why
+
+
 class Moment(NamedTuple):
     """Input of the rules in one control period."""
 
@@ -52,19 +81,6 @@ class Moment(NamedTuple):
     path: TrackedPath  # the current path
     before: Step  # the step of the previous control period
     clock: StuckClock  # time without progress
-
-
-class Plant(Protocol):
-    """Robot that executes twists: in physics (`Bullet`), exactly (`Kinematic`), or from a log (`Logged`)."""
-
-    state: State  # true pose and velocity
-
-    @property
-    def touched(self) -> bool:
-        """Whether the robot has touched anything so far."""
-
-    def advance(self, command: Twist, actuated: Twist, limiter: int = 0) -> None:
-        """Drive for one control period with the given motor targets; the command and its limiter are for the log."""
 
 
 class Rows(Protocol):

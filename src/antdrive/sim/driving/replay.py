@@ -22,10 +22,11 @@ from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.robots import Twist
 from antdrive.robots.noise import moved_by
-from antdrive.sim.driving.body import Body, Note
-from antdrive.sim.driving.localising import Exact, logged_senses
+from antdrive.sim.driving.body import Body
+from antdrive.sim.driving.localising import Exact
+from antdrive.sim.driving.observation import Note
 from antdrive.sim.driving.plants import Bullet
-from antdrive.sim.driving.senses import Senses
+from antdrive.sim.driving.senses import Senses, logged_senses
 from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.driving.survey import MoverTracking, Survey, reset_ticks, turning_room
 from antdrive.sim.log.outcome import Outcome

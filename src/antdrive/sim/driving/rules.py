@@ -82,8 +82,6 @@ CORNER_STEP = 0.1  # between the places of a route that are compared with corner
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop within this fraction of the goal's tolerance
 AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
-EXPLORING_LIMITERS = (*LIMITERS, "sight")  # names of the limiting rules of a mapless robot
-SIGHT_LIMIT = EXPLORING_LIMITERS.index("sight")
 
 
 class Pursuit:

@@ -12,10 +12,12 @@ from antdrive.base import Pose
 from antdrive.robots import RobotSpec, Twist
 from antdrive.robots.noise import Wheels
 from antdrive.robots.spec import Noise, Odometry
+from antdrive.sim.driving.localising import Exact, localiser_of
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.sensing.odometer import Odometer
 
 if TYPE_CHECKING:
+    from antdrive.sim.log.record import DriveRecord
     from antdrive.sim.physics.engine import State
 
 
@@ -98,3 +100,14 @@ def senses_of(
     if kind == "true":
         return SlippingSenses(levels, robot.track, period, seed)
     return NoisySenses(levels, robot.track, period, seed, errors if mapless else None)
+
+
+def logged_senses(record: DriveRecord) -> tuple[Senses, Exact]:
+    """Create the senses and the localiser of a logged drive."""
+    odometry = 1.0 if record.sensing is None else record.sensing.odometry
+    period, mapless = 1 / record.control_hz, record.exploring
+    levels = record.localisation, record.robot, record.noise, odometry, period
+    return (
+        senses_of(*levels, record.seed, mapless=mapless),
+        localiser_of(*levels, record.task.start, mapless=mapless),
+    )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from antdrive.base import Floats, Point, Pose
 from antdrive.robots.lidar import Lidar
+from antdrive.sim.driving.observation import FirstSight
 from antdrive.sim.driving.parts import Rows
 from antdrive.sim.log.rollout import scans_logged
 from antdrive.sim.log.streams import random_stream
@@ -17,13 +18,6 @@ from antdrive.worlds import Trajectories, World
 from antdrive.worlds.world import PointWorld
 
 BEYOND = 0.2  # what is farther than this beyond a radius meets no cell of a map within it [m]
-
-
-class FirstSight(NamedTuple):
-    """What a mapless robot is given at its start."""
-
-    ground: World  # what stands around the start
-    ranges: Floats  # the first scan (beams,) [m]
 
 
 @dataclass(eq=False)

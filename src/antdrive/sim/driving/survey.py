@@ -14,8 +14,8 @@ from antdrive.base import Floats, Point, Pose
 from antdrive.robots import RobotSpec, Twist
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving import _kernels_hits
+from antdrive.sim.driving.observation import FirstSight
 from antdrive.sim.driving.parts import Rows
-from antdrive.sim.driving.simulated_lidar import FirstSight
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.policy import SCANNED
 from antdrive.sim.sensing.mapping import OccupancyMap, clear_way, shape_of

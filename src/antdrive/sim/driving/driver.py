@@ -1,0 +1,129 @@
+"""Driver: follow the guide, apply the rules, arrive or give up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from antdrive.base import Pose
+from antdrive.robots import PursuitState, RobotSpec, TrackedPath, Twist
+from antdrive.robots.noise import moved_by
+from antdrive.sim.driving.observation import Note, Observation
+from antdrive.sim.driving.parts import Ending, Guide, Moment, Rule, Step, StuckClock
+from antdrive.sim.driving.perceived_movers import Given
+from antdrive.sim.driving.rules import WAITING_SPEED
+from antdrive.sim.driving.survey import Scans
+from antdrive.sim.log.ending import STUCK_TIME, arrived, stopped
+from antdrive.sim.log.outcome import Outcome
+from antdrive.worlds import Task
+
+PROGRESS_HZ = 10  # reports of progress per simulated second
+
+
+class Driver:
+    """Mind that drives a robot along a path, one step per control period.
+
+    Attributes:
+        path: the current path
+        step: the current step
+        progress_periods: control periods between two reports of progress
+    """
+
+    def __init__(
+        self,
+        guide: Guide,
+        rules: Sequence[Rule],
+        path: TrackedPath,
+        task: Task,
+        robot: RobotSpec,
+        hz: int,
+        scans: Scans | None = None,
+        given: Given | None = None,
+    ) -> None:
+        self.path, self.step = path, Step()
+        self._guide, self._rules, self._task, self._hz = guide, tuple(rules), task, hz
+        self._scans, self._given, self._clock = scans, given, StuckClock()
+        self._patience = round(STUCK_TIME * hz)
+        self._full_turn = full_turn(robot, hz)
+        self.progress_periods = hz // PROGRESS_HZ or 1
+
+    @property
+    def fraction(self) -> float:
+        """Completed fraction of the route."""
+        return self.step.pursuit.arc / self.path.length
+
+    def act(self, now: Observation) -> tuple[Twist | None, Note]:
+        """Return the command of one control period, None to stay where the robot stands, and a note on it."""
+        guide, task, before, believed = self._guide, self._task, self.step, now.pose
+        if now.scan is not None and self._scans is not None:
+            believed = self._scans.read(now.tick, believed, now.scan)
+        if self._given is not None:
+            self._given.read(now.movers)
+        silent = Note(believed)
+        if now.tick and arrived(believed, now.twist, before.command, task.goal, task.goal_tolerance):
+            return None, silent
+        pose = moved_by(believed, now.pending, 1 / self._hz)
+        waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
+        trigger = guide.trigger(now.tick, pose, waiting, self.path, before.pursuit.arc)
+        if trigger:
+            self._follow(guide.replan(now.tick, pose, trigger))
+        if guide.plan_error:
+            return None, silent._replace(ending=self._invalid_plan(now.tick))
+        if guide.blocked:
+            return None, silent._replace(ending=Ending(Outcome.BLOCKED, guide.blocked))
+        self.path = guide.refreshed(self.path, pose)
+        moment, step = Moment(now.tick, pose, self.path, self.step, self._clock), self.step
+        for rule in self._rules:
+            step = rule.apply(moment, step)
+        self.step = step
+        if self._at_end_of_route(pose, now.twist, before.command) and not (
+            self._follow(guide.missed(now.tick, pose)) or guide.may_wait
+        ):
+            return None, silent._replace(ending=self._invalid_plan(now.tick) if guide.plan_error else None)
+        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scan_turning)
+        return step.command, Note(believed, step.pursuit.limiter, self._gives_up())
+
+    def _gives_up(self) -> Ending | None:
+        """End the drive of a robot without progress. Turning on the spot adds the time of a full turn to the limit."""
+        clock = self._clock
+        if clock.driving < self._patience and clock.turning < self._patience + self._full_turn:
+            return None
+        return Ending(Outcome.STUCK, clock.reason)
+
+    def with_reason(self, ending: Ending, tick: int) -> Ending:
+        """Add the guide's failure note to the reason of a robot that got stuck or timed out."""
+        if ending.outcome not in (Outcome.STUCK, Outcome.TIMED_OUT):
+            return ending
+        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self._guide.failure_note(tick)))))
+
+    def _follow(self, path: TrackedPath | None) -> bool:
+        """Switch to a new path, and return whether there is one."""
+        if path is None:
+            return False
+        self.path = path
+        self.step = self.step._replace(pursuit=PursuitState(limiter=self.step.pursuit.limiter))
+        self._clock = self._clock._replace(farthest=0.0)
+        return True
+
+    def _at_end_of_route(self, pose: Pose, twist: Twist, last: Twist) -> bool:
+        """Return whether the robot stands at the end of its route, and not at the goal, where it arrives in the next period."""
+        path, (command, pursuit, *_), task = self.path, self.step, self._task
+        if path.length - pursuit.arc > path.goal_distance or any(command) or not stopped(twist, last):
+            return False
+        return math.dist(pose[:2], task.goal) > task.goal_tolerance
+
+    def _invalid_plan(self, tick: int) -> Ending:
+        """Return the ending after an invalid plan."""
+        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.plan_error}")
+
+
+def full_turn(robot: RobotSpec, hz: int) -> int:
+    """Return the number of control periods of a full turn on the spot."""
+    return round(2 * math.pi / robot.max_yaw_rate * hz)
+
+
+class OnePath(Guide):
+    """Guide that keeps one path."""
+
+    def __init__(self) -> None:
+        self.log, self.walls = [], []
