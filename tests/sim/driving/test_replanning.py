@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ from antdrive.sim.log.metrics import tracking_error_max_m
 from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
 from antdrive.worlds.world import by_geometry
 from tests.records import COARSE, changed
+from tests.sim.driving.ground_truth import GroundTruth
 
 # A wall with two gates; the path through the nearer gate is shorter.
 POSTS = tuple(Disc(4.0, y, 0.25) for y in np.arange(0.25, 6.0, 0.5) if not (2.2 < y < 3.8 or y > 5.0))
@@ -189,7 +191,10 @@ ASIDE = Keyframed(radius=0.3, keyframes=((0.0, 7.0, 0.5), (100.0, 7.0, 0.51)), l
 def monitor_of(*movers, robot, planner="dstar-lite", **settings):
     task = changed(TASK, "world", movers=movers)
     policy = ReplanPolicy(**settings)
-    made = compose(Scenario.of(task, planner, robot, avoidance=None, replanning=policy)).guide
+    s = Scenario.of(task, planner, robot, avoidance=None, replanning=policy)
+    truth = GroundTruth(s.trajectories, s.known_perception, s.control_hz)
+    with mock.patch("antdrive.sim.compose._given", lambda _: truth):
+        made = compose(s).guide
     return made, made.route(*made.first())[1]
 
 

@@ -1,4 +1,4 @@
-"""What a robot observes, and what it tells of its commands. Nothing here holds what is true."""
+"""Observations of a robot, and its notes on commands. Nothing here holds what is true."""
 
 from __future__ import annotations
 
