@@ -193,7 +193,7 @@ def monitor_of(*movers, robot, planner="dstar-lite", **settings):
     policy = ReplanPolicy(**settings)
     s = Scenario.of(task, planner, robot, avoidance=None, replanning=policy)
     truth = GroundTruth(s.trajectories, s.known_perception, s.control_hz)
-    with mock.patch("antdrive.sim.compose._given", lambda _: truth):
+    with mock.patch("antdrive.sim.compose._given", return_value=truth):
         made = compose(s).guide
     return made, made.route(*made.first())[1]
 

@@ -15,10 +15,10 @@ from antdrive.sim.pipeline import driven
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World
 from tests.records import changed
 
-ROOM = World("room", (0.0, 0.0, 12.0, 6.0), (Disc(3.0, 2.4, 0.3), Disc(5.0, 4.0, 0.4)))
+ROOM = World("room", (0.0, 0.0, 12.0, 6.0), (Disc(3.0, 4.6, 0.3), Disc(5.0, 4.0, 0.4)))
 TASK = Task(ROOM, (1.0, 3.0, 0.0), (9.0, 3.0), cell=0.2)
-TURNS = ((0.0, 7.0, 1.0), (3.0, 7.0, 2.2))  # a mover that walks up, and whose way is another from 3 s on
-UP, DOWN = (Keyframed(radius=0.2, keyframes=(*TURNS, (6.0, 7.0, y)), loop="once") for y in (4.0, 0.8))
+TURNS = ((0.0, 3.4, 1.0), (3.0, 3.4, 2.2))  # a mover that walks up, and whose way is another from 3 s on
+UP, DOWN = (Keyframed(radius=0.2, keyframes=(*TURNS, (6.0, 3.4, y)), loop="once") for y in (4.0, 0.8))
 FAR = Cruising(radius=0.3, position=(9.5, 5.0), velocity=(-0.4, -0.2))
 #: What is true in a second drive, unlike in the first, and what the robot has: it does not know the difference at first.
 KINDS = {
