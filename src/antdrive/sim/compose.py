@@ -13,20 +13,22 @@ from antdrive.robots import LIMITERS, Avoidance
 from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.driver import full_turn
-from antdrive.sim.driving.exploring import Exploration
+from antdrive.sim.driving.exploring import Exploration, TurnToScan
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import Exact, localiser_of
 from antdrive.sim.driving.mover_sense import MoverSense
+from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
 from antdrive.sim.driving.parts import EXPLORING_LIMITERS, Logs, RouteGuide, Rule
 from antdrive.sim.driving.perceived_movers import Given, PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
-from antdrive.sim.driving.routes import OneRoute, RoutePlanner
-from antdrive.sim.driving.rules import GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, SlowAtCorners, TurnToScan
+from antdrive.sim.driving.route_planner import RoutePlanner
+from antdrive.sim.driving.routes import OneRoute
+from antdrive.sim.driving.rules import GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, SlowAtCorners
 from antdrive.sim.driving.senses import Senses, senses_of
 from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import MoverDetector, MoverTracking, Scans, Survey, turning_room
+from antdrive.sim.driving.survey import MoverDetector, Scans, Survey, turning_room
 from antdrive.sim.policy import Perception
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround

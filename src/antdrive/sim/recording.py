@@ -11,7 +11,7 @@ from antdrive.base.version import versions
 from antdrive.planners import AStar, PlanResult, Query, Tangent
 from antdrive.sim.compose import avoidance_of, perception_of
 from antdrive.sim.driving.plants import Drive
-from antdrive.sim.driving.routes import by_contents, grid_of, outlined_grid_of
+from antdrive.sim.driving.route_planner import by_contents, grid_of, outlined_grid_of
 from antdrive.sim.log.record import (
     ComponentRecord,
     DriveRecord,

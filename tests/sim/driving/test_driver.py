@@ -22,6 +22,7 @@ from antdrive.sim.driving.blockage import blocked_cells, covered_discs
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import drive, follow
 from antdrive.sim.driving.driver import Driver, OnePath, full_turn
+from antdrive.sim.driving.exploring import TurnToScan
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.observation import SILENT, Note, Observation
 from antdrive.sim.driving.parts import SIGHT_LIMIT, Ending, Guide, Moment, Step, StuckClock
@@ -32,12 +33,11 @@ from antdrive.sim.driving.rules import (
     Avoid,
     KeepToSchedule,
     Pursuit,
-    Schedule,
-    TurnToScan,
     braked,
     slow_down,
     stopping_time,
 )
+from antdrive.sim.driving.schedule import Schedule
 from antdrive.sim.driving.senses import NoisySenses, Senses
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME

@@ -18,13 +18,14 @@ from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, check, near_polyline, point_at, surrounding
 from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import INTERVAL
+from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.observation import FirstSight, Observation
 from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import IDLE_TIME, Recovery, ScanTurn
 from antdrive.sim.driving.replay import replay, scans_of
-from antdrive.sim.driving.routes import RoutePlanner, bounds_of
+from antdrive.sim.driving.route_planner import RoutePlanner, bounds_of
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import MoverTracking, Survey, reset_ticks
+from antdrive.sim.driving.survey import Survey, reset_ticks
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.policy import SCANNED, STALLED, Perception
 from antdrive.sim.recorded import rebuilt

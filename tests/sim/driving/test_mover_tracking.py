@@ -13,10 +13,10 @@ from antdrive.base.errors import FieldError
 from antdrive.robots import PurePursuit, load_robot
 from antdrive.sim import Outcome, Perception, Rollout, Scenario, run
 from antdrive.sim.compose import compose
+from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.perceived_movers import Tracked
 from antdrive.sim.driving.replay import replay
 from antdrive.sim.driving.rules import SlowAtCorners
-from antdrive.sim.driving.survey import MoverTracking
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import PerceptionRecord

@@ -24,8 +24,9 @@ from antdrive.robots import Footprint, Twist
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, route_planner
 from antdrive.sim.driving.replanning import CellByCell
-from antdrive.sim.driving.routes import outlined_grid_of
-from antdrive.sim.driving.rules import MAX_LAG, KeepToSchedule, Schedule, slow_down
+from antdrive.sim.driving.route_planner import outlined_grid_of
+from antdrive.sim.driving.rules import KeepToSchedule, slow_down
+from antdrive.sim.driving.schedule import MAX_LAG, Schedule
 from antdrive.sim.log.metrics import tracking_error_max_m
 from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
 from antdrive.worlds.world import by_geometry
@@ -416,7 +417,7 @@ def test_an_error_of_antdrive_around_a_replanner_is_not_the_planners(monkeypatch
     def broken(*_):
         raise KeyError("ours")
 
-    monkeypatch.setattr("antdrive.sim.driving.routes.closed_cells", broken)
+    monkeypatch.setattr("antdrive.sim.driving.route_planner.closed_cells", broken)
     with pytest.raises(KeyError, match="ours"):
         run(Scenario.of(MOVING, "dstar-lite", time_limit=10.0))
 
@@ -480,7 +481,7 @@ def test_plans_for_a_footprint_are_repaired_and_as_short_as_those_from_scratch(p
     repaired, scratch = route_planner(scenario), route_planner(replace(scenario, planner=load_planner("astar")))
     made = []
     monkeypatch.setattr(
-        "antdrive.sim.driving.routes.replanner_for", lambda *args: made.append(args) or replanner_for(*args)
+        "antdrive.sim.driving.route_planner.replanner_for", lambda *args: made.append(args) or replanner_for(*args)
     )
     repaired.mapped = mapped
     for turn, discs in enumerate(((), (Disc(4.0, 3.0, 0.45),), (Disc(4.0, 3.0, 0.45), Disc(5.0, 4.0, 0.3)), ())):

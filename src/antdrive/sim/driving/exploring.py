@@ -18,16 +18,17 @@ from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.kernel_cache import clock
 from antdrive.base.records import derived
 from antdrive.planners import PlanResult, PlanStatus, Query, smooth
-from antdrive.robots import TrackedPath, Twist, outline_of
+from antdrive.robots import RobotSpec, TrackedPath, Twist, outline_of
 from antdrive.robots.control.pursuit import obstacles_around
 from antdrive.robots.default_margin import mapless_margins
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import RouteGuide, Rows
+from antdrive.sim.driving.parts import Moment, RouteGuide, Rows, Step, table_logged
 from antdrive.sim.driving.recovery import TRAIL, Recovery, ScanTurn
-from antdrive.sim.driving.routes import RoutePlanner, bounds_of
-from antdrive.sim.driving.survey import PATIENCE, ROUTE_CHECK_STEP, RoutePoints, Survey, table_logged
+from antdrive.sim.driving.route_planner import RoutePlanner, bounds_of
+from antdrive.sim.driving.rules import ROTATING, braked
+from antdrive.sim.driving.survey import PATIENCE, ROUTE_CHECK_STEP, RoutePoints, Survey
 from antdrive.sim.policy import (
     BACKED,
     DISCOVERED,
@@ -395,3 +396,21 @@ class Exploration(RouteGuide):
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
         """Return the array `seen`: the discs behind each plan. `cells` is empty, since the log has no grid for them."""
         return {"seen": table_logged(self._seen, 4, log, per_tick), "cells": np.empty((0, 2), dtype=np.int32)}
+
+
+class TurnToScan:
+    """Rule: make the scan turn once the robot stands; stop where it has no path."""
+
+    def __init__(self, guide: Exploration, robot: RobotSpec, hz: int) -> None:
+        self._guide, self._robot, self._hz = guide, robot, hz
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """Return the scan turn's command, or one that brakes for it."""
+        scan_turn, last = self._guide.scan_turn, now.before.command
+        if scan_turn is not None and not last.speed:
+            turning = step.pursuit._replace(limiter=ROTATING)
+            return step._replace(command=scan_turn.command(now.pose, last), pursuit=turning, speed_limit=0.0)
+        if scan_turn is not None or self._guide.lost:
+            command = braked(last, self._robot, self._hz)
+            return step._replace(command=command, speed_limit=max(command.speed, 0.0))
+        return step

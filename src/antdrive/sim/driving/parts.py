@@ -7,9 +7,11 @@ and may correct the estimate, the guide provides the path, the rules compute the
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.base import Floats, Point, Pose
 from antdrive.robots import LIMITERS, PursuitState, TrackedPath, Twist
@@ -19,7 +21,7 @@ from antdrive.sim.log.record import ReplanRecord, finite_or_none
 
 if TYPE_CHECKING:
     from antdrive.planners import PlanResult
-    from antdrive.sim.driving.rules import Schedule
+    from antdrive.sim.driving.schedule import Schedule
     from antdrive.worlds import Grid, Route
 
 EXPLORING_LIMITERS = (*LIMITERS, "sight")  # names of the limiting rules of a mapless robot
@@ -104,6 +106,15 @@ class Logs(Protocol):
 
     def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
         """Return arrays by their names in `Rollout`; `per_tick` is the number of rows per control period."""
+
+
+def table_logged(
+    taken: Iterable[tuple[int, npt.NDArray[Any]]], columns: int, log: Rows, per_tick: int
+) -> npt.NDArray[np.float32]:
+    """Return a table (K, columns) of a log: entries noted in control periods; each begins with the log row of its period."""
+    kept = [(tick * per_tick, lines) for tick, lines in taken if tick * per_tick < len(log.t)]
+    tables = [np.column_stack((np.full(len(lines), row), lines)) for row, lines in kept]
+    return np.concatenate(tables or [np.empty((0, columns))]).astype(np.float32)
 
 
 class Guide(Protocol):

@@ -15,7 +15,7 @@ from antdrive.sim.driving.observation import NOBODY, Movers
 from antdrive.sim.policy import Perception
 
 if TYPE_CHECKING:
-    from antdrive.sim.driving.survey import MoverTracking
+    from antdrive.sim.driving.mover_tracking import MoverTracking
     from antdrive.sim.sensing.tracking import TrackedMovers
 
 STANDS = 0.08  # tracks slower than this stand still [m/s]

@@ -35,7 +35,8 @@ from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blockage import Blockage, blocked_cells, covered_discs, points_at, with_obstacles
 from antdrive.sim.driving.movers_ahead import MoversAhead, Traffic
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
-from antdrive.sim.driving.routes import OneRoute, RoutePlanner
+from antdrive.sim.driving.route_planner import RoutePlanner
+from antdrive.sim.driving.routes import OneRoute
 from antdrive.sim.log.record import DECISION
 from antdrive.sim.policy import LATE, MISSED, STRAYED, WAITED, ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, segment_clearance

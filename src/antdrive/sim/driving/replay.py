@@ -24,11 +24,12 @@ from antdrive.robots import Twist
 from antdrive.robots.noise import moved_by
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.localising import Exact
+from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.observation import Note
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.driving.senses import Senses, logged_senses
 from antdrive.sim.driving.simulated_lidar import SimulatedLidar
-from antdrive.sim.driving.survey import MoverTracking, Survey, reset_ticks, turning_room
+from antdrive.sim.driving.survey import Survey, reset_ticks, turning_room
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine, State
