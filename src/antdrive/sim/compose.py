@@ -15,7 +15,7 @@ from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.driver import full_turn
 from antdrive.sim.driving.exploring import Exploration, TurnToScan
 from antdrive.sim.driving.habits import Habits
-from antdrive.sim.driving.localising import Exact, localiser_of
+from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.mover_sense import MoverSense
 from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
@@ -25,7 +25,7 @@ from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.route_planner import RoutePlanner
 from antdrive.sim.driving.routes import OneRoute
 from antdrive.sim.driving.rules import GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, SlowAtCorners
-from antdrive.sim.driving.senses import Senses, senses_of
+from antdrive.sim.driving.senses import Senses, positioning
 from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverDetector, Scans, Survey, turning_room
@@ -53,7 +53,6 @@ class Parts(NamedTuple):
     rules: tuple[Rule, ...]  # in order of application
     logs: tuple[Logs, ...]
     limiters: tuple[str, ...]  # names of the rules that limit the speed
-    mapped: bool  # whether plans use the given map
 
 
 def compose(s: Scenario) -> Parts:
@@ -61,10 +60,8 @@ def compose(s: Scenario) -> Parts:
     perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
     tracks_movers, mapped = perception.kind == "lidar", s.map == "given"
     moving = s.moving
-    start, mapless = s.task.start, not mapped
     levels = s.localisation, s.robot, s.noise, s.odometry, 1 / hz
-    senses = senses_of(*levels, s.seed, mapless=mapless)
-    localiser = localiser_of(*levels, start, mapless=mapless)
+    senses, localiser = positioning(*levels, s.task.start, s.seed, mapless=not mapped)
     lidar = None if mapped and not tracks_movers else _simulated_lidar(s)
     survey = _survey(s, lidar, tracks_movers, matching=localiser.matched) if lidar and not mapped else None
     scans = _mover_detector(s) if mapped and tracks_movers else survey
@@ -110,7 +107,6 @@ def compose(s: Scenario) -> Parts:
         tuple(rules),
         tuple(part for part in (guide, tracking) if part is not None),
         limiters=EXPLORING_LIMITERS if survey else LIMITERS,
-        mapped=mapped,
     )
 
 

@@ -9,8 +9,8 @@ import pytest
 from antdrive.robots import Noise, Odometry, Twist
 from antdrive.robots.noise import SLIP_TIME
 from antdrive.robots.spec import SAMPLE_RATE
-from antdrive.sim.driving.localising import Exact, Fixes, Fused, Reckoned, localiser_of
-from antdrive.sim.driving.senses import NoisySenses
+from antdrive.sim.driving.localising import Exact, Fixes, Fused, Reckoned
+from antdrive.sim.driving.senses import NoisySenses, positioning
 from antdrive.sim.physics.engine import State
 from antdrive.sim.sensing.pose_filter import PoseFilter
 
@@ -99,7 +99,7 @@ def test_exact_fixes_are_the_estimate_and_scans_do_not_move_it(jackal):
     assert np.abs(error).max() < 1e-5
     assert np.linalg.eigvalsh(covariance).min() > 0
     robot = dataclasses.replace(jackal, noise=exact)
-    assert not localiser_of("fixes", robot, 1.0, 1.0, 1 / 60, (0.0, 0.0, 0.0), mapless=True).matched
+    assert not positioning("fixes", robot, 1.0, 1.0, 1 / 60, (0.0, 0.0, 0.0), 0, mapless=True)[1].matched
 
 
 @pytest.mark.parametrize(
@@ -114,6 +114,6 @@ def test_exact_fixes_are_the_estimate_and_scans_do_not_move_it(jackal):
     ],
 )
 def test_scans_correct_estimates_that_drift_or_jump(kind, noise, mapless, made, matched, jackal):
-    localiser = localiser_of(kind, jackal, noise, 1.0, 1 / 60, (0.0, 0.0, 0.0), mapless=mapless)
+    _, localiser = positioning(kind, jackal, noise, 1.0, 1 / 60, (0.0, 0.0, 0.0), 0, mapless=mapless)
     assert type(localiser) is made
     assert localiser.matched is matched

@@ -24,10 +24,9 @@ from antdrive.robots.noise import moved, moved_by
 from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.sim.compose import route_planner
 from antdrive.sim.driving.body import Body
-from antdrive.sim.driving.localising import localiser_of
 from antdrive.sim.driving.plants import Kinematic
 from antdrive.sim.driving.routes import OneRoute
-from antdrive.sim.driving.senses import senses_of
+from antdrive.sim.driving.senses import positioning
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import plan
@@ -150,11 +149,10 @@ def rehearsed_clearance(s: Scenario) -> float:
     known = dataclasses.replace(route_planner(s), task=s.task, smoothing=s.smoothing)
     route, path = OneRoute(known).route(grid, answer)
     period = 1 / s.control_hz
-    levels = "fixes", s.robot, s.noise, 1.0, period
-    senses, localiser = senses_of(*levels, s.seed), localiser_of(*levels, s.task.start)
+    measured = positioning("fixes", s.robot, s.noise, 1.0, period, s.task.start, s.seed)
     plant = Kinematic(s.task.start, lambda pose, twist: np.array([moved(pose, Twist(*(period * v for v in twist)))]))
     limit = SETTLING + PATIENCE * route.length / s.robot.max_speed
-    body = Body(plant, senses, localiser, hz=s.control_hz, limit=limit)
+    body = Body(plant, *measured, hz=s.control_hz, limit=limit)
     command, state = Twist(0.0, 0.0), PursuitState()
     while body.ended is None and not (
         state.arc > path.length - path.goal_distance and abs(plant.state.speed) < STANDING

@@ -18,8 +18,7 @@ from antdrive.base.version import versions
 from antdrive.planners import PLANNERS, Query, smooth
 from antdrive.robots import RobotSpec, outline_of
 from antdrive.sim.driving.drive import follow
-from antdrive.sim.driving.localising import localiser_of
-from antdrive.sim.driving.senses import senses_of
+from antdrive.sim.driving.senses import positioning
 from antdrive.sim.log.certificate import travel_between
 from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.outcome import Outcome
@@ -154,8 +153,7 @@ def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
     route = smooth(answer, grid, task, kind=c.smoothing)
     period, limit = 1 / c.control_hz, 30.0 + 10.0 * route.length / robot.max_speed
     path = c.controller.prepare(route, task.world, robot, margin, period, task.goal_tolerance, noise=c.noise)
-    senses = senses_of("fixes", robot, c.noise, 1.0, period, seed)
-    localiser = localiser_of("fixes", robot, c.noise, 1.0, period, task.start)
+    senses, localiser = positioning("fixes", robot, c.noise, 1.0, period, task.start, seed)
     with Engine(task.world, robot, physics_hz=c.physics_hz) as engine:
         rates: dict[str, Any] = {"limit": limit, "control_hz": c.control_hz}
         log = follow(engine, c.controller, path, task, **rates, senses=senses, localiser=localiser)

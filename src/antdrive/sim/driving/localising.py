@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from antdrive.base import Floats, Pose
-from antdrive.robots import RobotSpec, Twist
+from antdrive.robots import Twist
 from antdrive.robots.noise import fix_gains, moved, steady_errors
 from antdrive.robots.spec import Noise, Odometry
 from antdrive.sim.sensing.pose_filter import PoseFilter
@@ -112,17 +112,3 @@ class Fused(Exact):
 
     def _corrected(self, fix: Pose) -> Pose:
         return self._filter.correct(self.pose, fix)
-
-
-def localiser_of(
-    kind: str, robot: RobotSpec, noise: float, odometry: float, period: float, start: Pose, *, mapless: bool = False
-) -> Exact:
-    """Create the localiser of a drive."""
-    levels = robot.noise.scaled(noise)
-    if kind in ("odometry", "matching"):
-        return Reckoned(start, period, matched=kind == "matching")
-    if kind == "true" or not levels.nonzero:
-        return Exact(start, period)
-    if mapless:
-        return Fused(start, period, levels, robot.track, Odometry().scaled(odometry))
-    return Fixes(start, period, levels, robot.track)

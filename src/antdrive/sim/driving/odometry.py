@@ -54,14 +54,14 @@ def _rebuilt(rollout: Rollout) -> LoggedOdometry:
     The imports load compiled code, which tables of exact drives do not need.
     """
     from antdrive.robots.control.pursuit import Twist
-    from antdrive.sim.driving.senses import logged_senses
+    from antdrive.sim.driving.senses import logged_positioning
     from antdrive.sim.physics.engine import State
     from antdrive.sim.sensing.pose_filter import PoseFilter
 
     record, rows, track = rollout.record, len(rollout.t), rollout.record.robot.track
     period, per_tick = 1 / record.control_hz, record.rows_per_period
     start = record.task.start
-    senses, localiser = logged_senses(record)
+    senses, localiser = logged_positioning(record)
     if not senses.noisy:
         return _true(rollout)
     encoders, measured, corrected = [], [], []

@@ -27,7 +27,7 @@ from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.observation import Note
 from antdrive.sim.driving.plants import Bullet
-from antdrive.sim.driving.senses import Senses, logged_senses
+from antdrive.sim.driving.senses import Senses, logged_positioning
 from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.driving.survey import Survey, reset_ticks, turning_room
 from antdrive.sim.log.outcome import Outcome
@@ -106,7 +106,7 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
     if record.exploring and not len(rollout.scans):
         yield "replay: a log without a map must have scans"
         return
-    senses, localiser = logged_senses(record)
+    senses, localiser = logged_positioning(record)
     if senses.noisy and not len(rollout.actuated) == len(rollout.estimate) == len(rollout.t):
         yield "replay: actuated and estimate are missing; required with noise"
         senses, localiser = Senses(), Exact(record.task.start, 1 / record.control_hz)
@@ -187,7 +187,7 @@ def scans_of(
         return lidar, None, {}
     tracks_movers = record.perception is not None and record.perception.kind == "lidar"
     tracking = MoverTracking(spec, hz) if tracks_movers else None
-    matching = logged_senses(record)[1].matched and (tracks_movers or not task.world.movers)
+    matching = logged_positioning(record)[1].matched and (tracks_movers or not task.world.movers)
     sight = lidar.first(task.start, turning_room(record.robot.radius))
     survey = Survey(record.robot, task.start, task.goal, hz, sight, matching=matching, tracking=tracking)
     return lidar, survey, dict.fromkeys(reset_ticks(record), survey.reset)

@@ -12,7 +12,7 @@ from antdrive.base import Pose
 from antdrive.robots import RobotSpec, Twist
 from antdrive.robots.noise import Wheels
 from antdrive.robots.spec import Noise, Odometry
-from antdrive.sim.driving.localising import Exact, localiser_of
+from antdrive.sim.driving.localising import Exact, Fixes, Fused, Reckoned
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.sensing.odometer import Odometer
 
@@ -88,26 +88,31 @@ class NoisySenses(SlippingSenses):
         return x, y, yaw
 
 
-def senses_of(
-    kind: str, robot: RobotSpec, noise: float, odometry: float, period: float, seed: int, *, mapless: bool = False
-) -> Senses:
-    """Create the senses of a drive."""
+def positioning(
+    kind: str,
+    robot: RobotSpec,
+    noise: float,
+    odometry: float,
+    period: float,
+    start: Pose,
+    seed: int,
+    *,
+    mapless: bool = False,
+) -> tuple[Senses, Exact]:
+    """Create the senses and the localiser of a drive."""
     levels, errors = robot.noise.scaled(noise), Odometry().scaled(odometry)
+    noisy, known = (levels, robot.track, period, seed), (start, period)
     if kind in ("odometry", "matching"):
-        return NoisySenses(levels, robot.track, period, seed, errors, fixes=False)
-    if not levels.nonzero:
-        return Senses()
-    if kind == "true":
-        return SlippingSenses(levels, robot.track, period, seed)
-    return NoisySenses(levels, robot.track, period, seed, errors if mapless else None)
+        return NoisySenses(*noisy, errors, fixes=False), Reckoned(*known, matched=kind == "matching")
+    if kind == "true" or not levels.nonzero:
+        return SlippingSenses(*noisy) if levels.nonzero else Senses(), Exact(*known)
+    if mapless:
+        return NoisySenses(*noisy, errors), Fused(*known, levels, robot.track, errors)
+    return NoisySenses(*noisy), Fixes(*known, levels, robot.track)
 
 
-def logged_senses(record: DriveRecord) -> tuple[Senses, Exact]:
+def logged_positioning(record: DriveRecord) -> tuple[Senses, Exact]:
     """Create the senses and the localiser of a logged drive."""
     odometry = 1.0 if record.sensing is None else record.sensing.odometry
-    period, mapless = 1 / record.control_hz, record.exploring
-    levels = record.localisation, record.robot, record.noise, odometry, period
-    return (
-        senses_of(*levels, record.seed, mapless=mapless),
-        localiser_of(*levels, record.task.start, mapless=mapless),
-    )
+    levels = record.localisation, record.robot, record.noise, odometry, 1 / record.control_hz
+    return positioning(*levels, record.task.start, record.seed, mapless=record.exploring)
