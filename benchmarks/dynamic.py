@@ -28,7 +28,7 @@ from antdrive.planners import Query, plan_in_time
 from antdrive.robots import load_robot
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, run
 from antdrive.sim.log.sights import tracked_rows
-from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED
+from antdrive.sim.policy import Trigger
 from antdrive.worlds import (
     Cruising,
     Disc,
@@ -327,7 +327,9 @@ def way_of(task: Task, robot: str, **settings: Any) -> Way:
     gaps = np.hypot(to[..., 0], to[..., 1]) - [mover.radius for mover in task.world.movers] - spec.radius
     ahead = to[..., 0] * np.cos(log.pose[:, 2:3]) + to[..., 1] * np.sin(log.pose[:, 2:3]) > 0
     near = speeds[((gaps < 1.0) & ahead).any(axis=1)].max(initial=0.0)
-    replans = sum(replan.trigger in (OBSTRUCTED, WAITED, TRAFFIC) for replan in log.record.replans)
+    replans = sum(
+        replan.trigger in (Trigger.OBSTRUCTED, Trigger.WAITED, Trigger.TRAFFIC) for replan in log.record.replans
+    )
     end = done.outcome.key if done.succeeded or done.outcome is not Outcome.SUCCEEDED else "not certified"
     return Way(done.succeeded, end, polyline_length(log.pose[:, :2]), float(log.t[-1]), replans, furthest,
                max(0.0, -float(speeds.min())), float(near))  # fmt: skip

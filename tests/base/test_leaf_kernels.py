@@ -15,18 +15,8 @@ from antdrive.worlds._kernels import Array, kernel, leaf
 
 SOURCES = sorted(Path(antdrive.__file__).parent.rglob("_kernels*.py"))
 ALLOCATES = {
-    "empty",
-    "zeros",
-    "ones",
-    "full",
-    "array",
-    "arange",
-    "empty_like",
-    "zeros_like",
-    "copy",
-    "stack",
-    "concatenate",
-}
+    "empty", "zeros", "ones", "full", "array", "arange", "empty_like", "zeros_like", "copy", "stack", "concatenate",
+}  # fmt: skip
 
 
 def decorated(trees: list[ast.Module]) -> Iterator[tuple[str, ast.FunctionDef]]:

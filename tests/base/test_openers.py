@@ -42,7 +42,7 @@ ALLOWED = {
     },
     "runs/margins/choice.py": {"temporary.write_bytes"},
     "runs/papers/claims.py": {"Path(__file__).parent / folder / f'{paper}.csv'.open"},
-    "runs/papers/reproduction.py": {"temporary.open", "path.read_bytes"},
+    "runs/papers/reproduction.py": {"temporary.open", "path.read_bytes", "gzip.open"},
     "sim/log/rollout.py": {"zipfile.ZipFile", "temporary.open"},
     "sim/physics/bullet.py": {"os.open"},
     "sim/physics/urdf.py": {"part.write_text", "folder / CHASSIS_FILE.write_text"},

@@ -165,6 +165,7 @@ sweep c.yaml -o out/new --seeds 1,b
 sweep c.yaml -o out/new -p as --set as.ants
 sweep c.yaml -o out/new --set as.ants=3
 sweep c.yaml -o out/new -p as --set as.ants=1..x..2
+sweep --world empty -p as --set planner.label=k -o out/new
 sweep nowhere.yaml -o out
 verify nothing.npz
 verify runs

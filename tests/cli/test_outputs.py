@@ -195,7 +195,7 @@ def test_a_log_without_space_for_its_result_is_named(refused, small, monkeypatch
 
 
 def test_an_encoder_that_dies_names_the_film(refused, small, monkeypatch):
-    monkeypatch.setitem(video.ENCODERS, ".mp4", video.ENCODERS[".mp4"]._replace(options=("-c:v", "nosuch")))
+    monkeypatch.setattr(video, "ENCODERS", {".mp4": ("-c:v", "nosuch")})
     said = refused("run", small, "--no-figures", "-o", "r", "--film", "r/film.mp4")
     assert said.startswith("antdrive: r/film.mp4: cannot be written (ffmpeg failed to write the film (")
 

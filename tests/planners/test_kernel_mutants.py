@@ -6,7 +6,7 @@ import numpy as np
 
 from antdrive.planners.anyangle._kernels_ga import tighten_all
 from antdrive.planners.anyangle._kernels_lines import Terrain, clear_cells, clear_line, corridor_moves, pull
-from antdrive.planners.colonies._kernels_colony import goal_pull, next_random
+from antdrive.planners.colonies._kernels_colony import next_random
 from antdrive.planners.colonies._kernels_mmas_dstar import close_gates
 from antdrive.planners.graph._kernels_dstar_lite import update_vertex
 from antdrive.planners.graph._kernels_incremental import COST, DIAGONAL, STRAIGHT, put
@@ -112,20 +112,6 @@ def test_random_numbers_are_those_of_xorshift64():
         for shift, left in ((13, True), (7, False), (17, True)):
             state ^= (state << shift if left else state >> shift) & (1 << 64) - 1
         assert actual == state
-
-
-def test_the_goal_pulls_along_the_moves_that_lead_to_it():
-    """The pull is the cosine between a move and the vector to the goal, at least 0, or to the letter their dot product."""
-    grid = Grid.from_free(np.random.default_rng(6).random((6, 7)) >= 0.1)
-    actual, plain = np.full((2, 42, 8), np.nan)
-    goal_pull(grid.moves.ravel(), grid.turns.cell, 7, 2, 4, False, actual)
-    goal_pull(grid.moves.ravel(), grid.turns.cell, 7, 2, 4, True, plain)
-    for (r, c), k in itertools.product(np.ndindex(6, 7), range(8)):
-        to, step = np.array([2.0 - r, 4.0 - c]), np.array(DIRECTIONS[k], dtype=float)
-        allowed = grid.moves[r, c] >> k & 1 and to.any()
-        cosine = to @ step / np.hypot(*to) / np.hypot(*step) if allowed else 0.0
-        np.testing.assert_allclose(actual[r * 7 + c, k], max(0.0, cosine), atol=1e-12)
-        np.testing.assert_allclose(plain[r * 7 + c, k], to @ step if allowed else 0.0, atol=1e-12)
 
 
 def test_via_points_without_obstacles_go_to_the_line_between_their_neighbours():

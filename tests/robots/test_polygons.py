@@ -1,4 +1,4 @@
-"""Footprints that are not centred on the axle: polygons, rectangles and discs beside it, against a dense outline."""
+"""Footprints against a dense outline: polygons, rectangles and discs beside the axle or centred on it."""
 
 import dataclasses
 import math
@@ -98,6 +98,16 @@ def test_the_distance_to_the_walls_is_that_of_the_outline(foot, pose):
 
 
 BOXES = st.builds(Footprint, st.floats(0.05, 0.5), st.floats(0.05, 0.5), st.sampled_from([0.0, 0.1]))
+
+
+@settings(max_examples=60)
+@given(BOXES, POSES, DISCS)
+def test_the_distances_of_a_centred_footprint_are_those_of_its_corners(foot, pose, disc):
+    (a, b), (x, y) = (foot.half_length, foot.half_width), pose[:2]
+    same = Footprint(rounding=foot.rounding, corners=((a, -b), (a, b), (-a, b), (-a, -b)))
+    for world in (World("w", (-50.0, -50.0, 50.0, 50.0), (Disc(*disc),)), World("w", (x - 1, y - 2, x + 3, y + 4))):
+        expected = footprint_clearance(world, same, [pose])[0]
+        assert footprint_clearance(world, foot, [pose])[0] == pytest.approx(expected, abs=1e-9)
 
 
 @settings(max_examples=120)
@@ -221,3 +231,20 @@ def test_the_inertia_is_that_of_a_fine_lattice_of_masses(foot):
     inside = [foot.depth(a, b) > 0 for a, b in zip(x.ravel(), y.ravel(), strict=True)]
     expected = 7.0 * (x**2 + y**2).ravel()[inside].mean()
     assert yaw_inertia(robot.mass, robot.footprint) == pytest.approx(expected, rel=0.05)
+
+
+def test_the_radius_is_that_of_the_circumscribed_circle():
+    assert Footprint.rectangle(0.508, 0.430).radius == pytest.approx(0.3328, abs=1e-4)
+    assert Footprint.disc(0.18).radius == 0.18
+
+
+def test_discs_whose_centres_are_far_may_still_be_the_nearest():
+    """Beside a blade of 2 m: one disc lies before its tip, one is so large that it comes near."""
+    blade = Footprint.rectangle(2.0, 0.2)
+    beside = Disc(0.0, -0.6, 0.05)
+    for far, gap in ((Disc(1.2, 0.0, 0.05), 0.15), (Disc(0.0, 3.0, 2.5), 0.4)):
+        world = World("w", (-50, -50, 50, 50), (beside, far))
+        np.testing.assert_allclose(footprint_clearance(world, blade, [(0.0, 0.0, 0.0)]), gap)
+        walk = [(0.01 * k, 0.0, 0.0) for k in range(60)]
+        alone = [footprint_clearance(world, blade, [pose])[0] for pose in walk]
+        np.testing.assert_array_equal(footprint_clearance(world, blade, walk), alone)

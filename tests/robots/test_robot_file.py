@@ -3,7 +3,7 @@ import json
 
 import pytest
 
-from antdrive.robots import Footprint, list_robots, load_robot, robot_schema, robot_to_dict
+from antdrive.robots import Footprint, load_robot, robot_schema, robot_to_dict
 from antdrive.robots.robot_file import footprint_to_dict
 from antdrive.sim import Engine
 from antdrive.sim.log.record import canonical_hash
@@ -24,14 +24,6 @@ max_lateral_acceleration: 1.0
 max_wheel_speed: 40.0
 wheel_torque: 2.0
 """
-
-
-def test_catalogue_robots_load():
-    assert set(list_robots()) >= {"turtlebot", "jackal"}
-    jackal = load_robot("jackal")
-    assert jackal.radius == pytest.approx(0.333, abs=1e-3)
-    assert jackal.max_speed == 2.0
-    assert load_robot("turtlebot").footprint.is_disc
 
 
 def test_a_robot_is_described_by_one_file(tmp_path):

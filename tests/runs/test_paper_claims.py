@@ -125,28 +125,58 @@ def test_less_is_decided_by_the_interval_of_the_paired_difference(shift, decisio
     assert found.value == pytest.approx(np.median(first - second))
 
 
-def test_an_interval_that_touches_the_bound_neither_confirms_nor_refutes_less():
-    same = np.full(20, 3.0)
-    found = verdict(LESS, same, same)
-    assert found.decision is Decision.OPEN
-    assert "the interval touches 0" in found.why
-    assert verdict(LESS, same + 1e-6, same).decision is Decision.REFUTED
-    assert verdict(NO_MORE, same, same).decision is Decision.HOLDS
-    assert verdict(claim("difference", "<=", 1.0), same + 1.0, same).decision is Decision.HOLDS
-    assert verdict(claim("difference", "<=", 1.0), same + 1.1, same).decision is Decision.REFUTED
+HOLDS, REFUTED, OPEN = Decision.HOLDS, Decision.REFUTED, Decision.OPEN
+SAME, NONE, MOST = np.full(20, 3.0), np.full(20, math.nan), np.resize([math.nan, *[1.0] * 49], 50)
+RARELY = np.resize([1.0, *[math.nan] * 24], 50)
+LIMITED, WITHIN, CENTRED = claim("difference", "<=", 1.0), claim("median", "<=", 10.0), np.linspace(-0.5, 0.5, 50)
+CALM, WILD = np.random.default_rng(0).uniform(4, 6, 50), np.random.default_rng(1).uniform(0, 40, 50)
+MEANS = {bound: claim("mean", "about", bound, quantity=("length",)) for bound in (101.0, 105.2, 120.0)}
 
 
-def test_oftener_counts_pairs_where_the_median_difference_is_zero():
-    same, other = np.zeros(40), np.r_[np.ones(16), np.zeros(24)]
-    assert verdict(LESS, same, other).value == 0.0
-    found = verdict(OFTENER, same, other)
-    assert found.decision is Decision.HOLDS
-    assert found.value == pytest.approx(-40.0)
-    assert "below in 16 of 40 pairs, above in 0: -40 points" in found.ours
-    assert verdict(OFTENER, other, same).decision is Decision.REFUTED
-    assert verdict(OFTENER, same, same).decision is Decision.OPEN
-    both = np.resize([-1.0, 1.0], 40)
-    assert verdict(OFTENER, both, np.zeros(40)).decision is Decision.OPEN
+def pairs(longer, shorter, of=200):
+    """Values whose pairs with zeros are above in `longer` and below in `shorter` cases."""
+    return np.r_[np.ones(longer), -np.ones(shorter), np.zeros(of - longer - shorter)]
+
+
+@pytest.mark.parametrize(
+    ("test", "first", "second", "decision", "words"),
+    [
+        # An interval that touches the bound neither confirms nor refutes "less".
+        (LESS, SAME, SAME, OPEN, "the interval touches 0"), (LESS, SAME + 1e-6, SAME, REFUTED, ""),
+        (NO_MORE, SAME, SAME, HOLDS, ""),
+        (LIMITED, SAME + 1.0, SAME, HOLDS, ""), (LIMITED, SAME + 1.1, SAME, REFUTED, ""),
+        # A path is less than none.
+        (LESS, SAME, NONE, HOLDS, ""), (LESS, NONE, SAME, REFUTED, ""),
+        *((test, NONE, NONE, OPEN, "neither ever reaches it") for test in (NO_MORE, OFTENER, NO_WORSE)),
+        # "Oftener" counts pairs, also where the median difference is 0; "no worse" lets a small effect pass.
+        (OFTENER, pairs(0, 16, 40), np.zeros(40), HOLDS, "below in 16 of 40 pairs, above in 0: -40 points"),
+        (OFTENER, pairs(16, 0, 40), np.zeros(40), REFUTED, ""), (OFTENER, SAME, SAME, OPEN, ""),
+        (OFTENER, pairs(20, 20, 40), np.zeros(40), OPEN, ""), (NO_WORSE, pairs(0, 0), np.zeros(200), HOLDS, ""),
+        (NO_WORSE, pairs(20, 20), np.zeros(200), HOLDS, ""), (NO_WORSE, pairs(8, 0), np.zeros(200), HOLDS, "+4 points"),
+        (NO_WORSE, pairs(70, 10), np.zeros(200), REFUTED, "+30 points"),
+        (NO_WORSE, pairs(40, 12), np.zeros(200), OPEN, "contains 12; the difference is small beside the spread"),
+        # One planner.
+        (WITHIN, np.linspace(4, 8, 30), (), HOLDS, ""), (WITHIN, np.linspace(14, 18, 30), (), REFUTED, ""),
+        (WITHIN, np.linspace(5, 15, 30), (), OPEN, ""), (WITHIN, np.linspace(4, 8, 5), (), OPEN, ""),
+        (WITHIN, NONE, (), REFUTED, "no path"),
+        (MEANS[101.0], CENTRED, (), HOLDS, ""), (MEANS[120.0], CENTRED, (), REFUTED, ""),
+        (MEANS[105.2], CENTRED, (), OPEN, ""),
+        (MEANS[101.0], NONE, (), OPEN, ""),
+        # Arrivals are judged by Wilson's interval; one failure confirms that a planner may fail, none does not refute it.
+        (claim("arrived", "<=", 0.2), RARELY, (), HOLDS, "2/50"), (claim("arrived", "<=", 0.2), MOST, (), REFUTED, ""),
+        (claim("arrived", ">=", 0.8), MOST, (), HOLDS, ""), (claim("arrived", ">=", 0.97), MOST, (), OPEN, ""),
+        (claim("failed", ">"), MOST, (), HOLDS, ""), (claim("failed", ">"), SAME, (), OPEN, "but others may"),
+        # The scatter is the range between quartiles; cases are counted.
+        (WIDER, WILD, CALM, HOLDS, ""), (WIDER, CALM, WILD, REFUTED, ""), (WIDER, CALM, CALM, OPEN, ""),
+        (claim("wins", ">=", 2, maps=2), [1.0], [2.0], HOLDS, ""),
+        (claim("wins", ">=", 2, maps=2), [2.0], [2.0], REFUTED, ""),
+    ],
+)  # fmt: skip
+def test_a_verdict_follows_from_the_interval_of_its_statistic(test, first, second, decision, words):
+    found = verdict(test, first, second)
+    assert found.decision is decision
+    assert words in f"{found.ours}; {found.why}"
+    assert verdict_facts(found)["verdict"] == decision.value
 
 
 def test_a_margin_or_threshold_that_no_paper_prints_is_called_ours():
@@ -162,23 +192,6 @@ def test_a_margin_or_threshold_that_no_paper_prints_is_called_ours():
         if one.statistic == "arrived" or {"near", "effort"} & {*one.quantity}:
             needs.append("threshold ours")
         assert all(words in one.remark for words in needs), (one.sentence, one.remark)
-
-
-def test_no_worse_lets_a_small_effect_pass_and_no_larger_one():
-    same = np.zeros(200)
-
-    def share(longer, shorter):
-        first = np.r_[np.ones(longer), -np.ones(shorter), np.zeros(200 - longer - shorter)]
-        return verdict(NO_WORSE, first, same)
-
-    assert share(0, 0).decision is Decision.HOLDS
-    assert share(20, 20).decision is Decision.HOLDS  # 0 points [-6, 6]
-    assert share(8, 0).decision is Decision.HOLDS  # 4 points, which a strict test refutes
-    assert share(70, 10).decision is Decision.REFUTED  # 30 points
-    unclear = share(40, 12)  # 14 points
-    assert unclear.value == pytest.approx(14.0)
-    assert unclear.decision is Decision.OPEN
-    assert "contains 12; the difference is small beside the spread" in unclear.why
 
 
 def test_a_ratio_compares_planners_on_maps_of_their_own():
@@ -245,21 +258,6 @@ def test_two_quantities_of_the_same_runs_are_compared():
     assert evaluate(back, {ONE: made}).decision is Decision.REFUTED
 
 
-def test_what_may_happen_is_borne_out_by_one_run_and_refuted_by_none():
-    assert verdict(claim("failed", ">"), [1.0] * 9 + [math.nan]).decision is Decision.HOLDS
-    never = verdict(claim("failed", ">"), [1.0] * 50)
-    assert never.decision is Decision.OPEN
-    assert "but others may" in never.why
-
-
-def test_where_neither_gets_anywhere_nothing_can_be_told():
-    none = np.full(20, math.nan)
-    for test in (NO_MORE, OFTENER, NO_WORSE):
-        found = verdict(test, none, none)
-        assert found.decision is Decision.OPEN
-        assert found.why.startswith("neither ever reaches it")
-
-
 def test_an_open_verdict_says_why():
     few = verdict(LESS, np.zeros(5), np.ones(5))
     assert few.decision is Decision.OPEN
@@ -296,13 +294,6 @@ def test_seeds_that_are_too_few_are_told_of_in_one_line():
     assert too_few_seeds(["lee2008"], 6, quick=True) == ""
 
 
-def test_a_path_is_less_than_none():
-    none = np.full(20, math.nan)
-    assert verdict(LESS, np.full(20, 500.0), none).decision is Decision.HOLDS
-    assert verdict(LESS, none, np.full(20, 500.0)).decision is Decision.REFUTED
-    assert "no path" in verdict(claim("median", "<=", 5.0), none).ours
-
-
 def test_runs_of_one_map_do_not_count_as_maps():
     rng = np.random.default_rng(0)
     by_map = np.array([-1.0, 2.0, -1.5, 1.0, -0.5])
@@ -312,44 +303,6 @@ def test_runs_of_one_map_do_not_count_as_maps():
     together = verdict(LESS, first, second, worlds=5)
     assert together.high - together.low >= apart.high - apart.low
     assert together.decision is Decision.OPEN
-
-
-def test_a_median_is_within_a_bound_or_beyond_it():
-    assert verdict(claim("median", "<=", 10.0), np.linspace(4, 8, 30)).decision is Decision.HOLDS
-    assert verdict(claim("median", "<=", 10.0), np.linspace(14, 18, 30)).decision is Decision.REFUTED
-    assert verdict(claim("median", "<=", 10.0), np.linspace(5, 15, 30)).decision is Decision.OPEN
-    assert verdict(claim("median", "<=", 10.0), np.linspace(4, 8, 5)).decision is Decision.OPEN  # too few
-
-
-def test_a_mean_is_the_printed_one_within_its_margin():
-    values = np.linspace(-0.5, 0.5, 50)
-    assert verdict(claim("mean", "about", 101.0, quantity=("length",)), values).decision is Decision.HOLDS
-    assert verdict(claim("mean", "about", 120.0, quantity=("length",)), values).decision is Decision.REFUTED
-    assert verdict(claim("mean", "about", 105.2, quantity=("length",)), values).decision is Decision.OPEN
-    assert verdict(claim("mean", "about", 101.0, quantity=("length",)), np.full(9, math.nan)).decision is Decision.OPEN
-
-
-def test_arrivals_are_judged_by_wilsons_interval():
-    few, most = np.resize([1.0, *[math.nan] * 24], 50), np.resize([math.nan, *[1.0] * 49], 50)
-    assert verdict(claim("arrived", "<=", 0.2), few).decision is Decision.HOLDS
-    assert verdict(claim("arrived", "<=", 0.2), most).decision is Decision.REFUTED
-    assert verdict(claim("arrived", ">=", 0.8), most).decision is Decision.HOLDS
-    assert verdict(claim("arrived", ">=", 0.97), most).decision is Decision.OPEN
-    assert verdict(claim("arrived", "<=", 0.2), few).value == 2 / 50
-
-
-def test_scatter_is_the_range_between_quartiles():
-    rng = np.random.default_rng(0)
-    calm, wild = rng.uniform(4, 6, 50), rng.uniform(0, 40, 50)
-    assert verdict(WIDER, wild, calm).decision is Decision.HOLDS
-    assert verdict(WIDER, calm, wild).decision is Decision.REFUTED
-    assert verdict(WIDER, calm, calm).decision is not Decision.HOLDS
-
-
-def test_cases_are_counted():
-    assert verdict(claim("wins", ">=", 2, maps=2), [1.0], [2.0]).decision is Decision.HOLDS
-    assert verdict(claim("wins", ">=", 2, maps=2), [2.0], [2.0]).decision is Decision.REFUTED
-    assert verdict_facts(verdict(claim("wins", ">=", 2, maps=2), [2.0], [2.0]))["verdict"] == "does not hold"
 
 
 def timed(*times):
@@ -412,37 +365,6 @@ def test_arms_that_are_timed_together_bear_a_drift_alike():
     assert interleaved([lambda: PaperRun(7, 0, None, 1.0, 3.0, 0.0)])[0].cpu_s == 3.0
 
 
-def move_counts(printed, digits):
-    """The moves of each kind that give a printed length."""
-    diagonals = range(int(printed / math.sqrt(2)) + 1)
-    counts = [MoveCount(round(printed - math.sqrt(2) * diagonal), diagonal) for diagonal in diagonals]
-    return [count for count in counts if abs(count.length - printed) < 10.0**-digits]
-
-
-def test_the_lengths_and_cells_that_lee2008_prints_agree():
-    tables = {
-        72.0833: 59, 83.3970: 67, 154.2376: 125, 175.2376: 146, 168.6518: 139, 59.2548: 47, 64.0833: 51, 123.6102: 101,
-        135.8234: 107, 131.6812: 107,
-    }  # fmt: skip
-    for length, cells in tables.items():
-        (moves,) = move_counts(length, 4)
-        assert moves.straight + moves.diagonal + 1 == cells
-
-
-def test_the_lengths_that_suganthi2019_prints_have_the_moves_of_its_maps():
-    """One has none: no path over square cells is 109.761 cells long."""
-    moves = {
-        13.899: [(4, 7)],
-        28.627: [(6, 16)],
-        42.184: [(4, 27)],
-        96.125: [(24, 51)],
-        59.355: [(24, 25)],
-        109.761: [],
-    }
-    for length, expected in moves.items():
-        assert move_counts(length, 3) == [MoveCount(*pair) for pair in expected]
-
-
 def test_moves_that_can_be_monotone():
     assert MoveCount(6, 16).monotone(19, 19)
     assert MoveCount(43, 57).monotone(99, 58)
@@ -496,7 +418,10 @@ def test_the_arms_of_a_group_are_kept_in_one_file_and_run_again_together(tmp_pat
     monkeypatch.setattr(reproduction, "PAPERS", {"hasan": lambda: [arms[0], alone, arms[1]]})
     first = reproduction.reproduce(["hasan"], tmp_path, seeds=3)
     assert [(e.name, len(runs)) for e, runs in first.measured] == [("dstar", 3), ("alone", 3), ("mmas-dstar", 3)]
-    assert sorted(path.name for path in (tmp_path / "trials").iterdir()) == ["hasan-m-alone.npz", "hasan-m-g.npz"]
+    assert sorted(path.name for path in (tmp_path / "trials").iterdir()) == [
+        "hasan-m-alone.json.gz",
+        "hasan-m-g.json.gz",
+    ]
     again = reproduction.reproduce(["hasan"], tmp_path, seeds=3)
     assert again.kept == 3
     works = [solve(e.planner, {}, query, 0).work for e, _ in first.measured]
@@ -520,7 +445,7 @@ def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
         ("astar", {}, shut),
     ]
     made = [solve(planner, options, query, 3) for planner, options, query in cases]
-    path, key = tmp_path / "t.npz", runs_key(one, 4)
+    path, key = tmp_path / "t.json.gz", runs_key(one, 4)
     save_runs(made, path, key)
     read = load_runs(path, key)
     quantities = (
@@ -537,7 +462,7 @@ def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path):
         assert load_runs(path, runs_key(dataclasses.replace(one, **changed), 4)) is None
     path.write_bytes(path.read_bytes()[:-200])
     assert load_runs(path, key) is None
-    assert load_runs(tmp_path / "none.npz", key) is None
+    assert load_runs(tmp_path / "none.json.gz", key) is None
 
 
 def test_a_length_that_no_map_has_is_refused(monkeypatch):

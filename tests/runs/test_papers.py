@@ -127,7 +127,7 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
 
     # The same command again takes the runs from their files, all but the one that is lost, and finds the same.
     assert found.kept == 0
-    lost = sorted((tmp_path / "trials").glob("*.npz"))[1]
+    lost = sorted((tmp_path / "trials").glob("*.json.gz"))[1]
     lost.unlink()
     again = measure_again(["han2007"], tmp_path, seeds=2)
     assert again.kept == len(few) - 1
@@ -266,9 +266,3 @@ def test_compared_ants_of_suganthi2019_walk_by_equal_rules():
     claims = [claim for claim in CLAIMS if claim.paper == "suganthi2019"]
     unequal = {claim.reading for claim in claims if len({rules[arm] for arm in claim.arms}) > 1}
     assert unequal == {"only PFACO's ants die, loops stay"}
-
-
-def test_the_code_of_a_run_is_without_comments_and_docstrings():
-    plain = reproduction.code_of(b"def f(x):\n    return x\n")
-    assert reproduction.code_of(b'"""A."""\n\n\ndef f(x):\n    """B."""\n    return x  # C\n') == plain
-    assert reproduction.code_of(b"def f(x):\n    return -x\n") != plain

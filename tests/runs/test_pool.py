@@ -1,4 +1,4 @@
-"""Worker processes: one that is killed costs no other run, worlds stay with theirs, runs are handed out once each."""
+"""Worker processes: one that is killed costs no other run, and runs are handed out once each."""
 
 import contextlib
 import operator
@@ -8,8 +8,6 @@ from collections import Counter
 from functools import partial
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from antdrive.base import kernel_cache
 from antdrive.base.errors import InputError
@@ -17,21 +15,19 @@ from antdrive.runs import pool
 from antdrive.runs.campaigns.campaign import make_campaign
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.running import finished_of
-from antdrive.runs.pool import CHUNK_SECONDS, LONGEST_CHUNK, Pool, Waiting, WorkerDied, call_now, processes_for
-from tests.runs.campaigns.works import Deadly, Endless, Listing
+from antdrive.runs.pool import Pool, WorkerDied, call_now, processes_for
+from tests.runs.campaigns.works import Deadly, Endless
 from tests.runs.light_works import Unloadable, compiling, dies_once, fails, process, refuses
 
 
-def jobs(worlds=1, seeds=8):
-    names = ["empty", "gate", "slalom"][:worlds]
-    return expand(make_campaign({"worlds": names, "planners": ["astar"], "seeds": seeds})).jobs
+def jobs():
+    return expand(make_campaign({"worlds": "empty", "planners": ["astar"], "seeds": 8})).jobs
 
 
-def made(work, processes, runs=(), **watched):
+def made(work, processes, **watched):
     """The rows of runs that a pool makes."""
     with Pool(processes, **watched) as workers:
-        done = workers.each(work, runs or jobs(), group=lambda job: job.case.place.world)
-        return [finished_of(one, watched.get("limit")).row for one in done]
+        return [finished_of(one, watched.get("limit")).row for one in workers.each(work, jobs())]
 
 
 @pytest.fixture(scope="module")
@@ -89,19 +85,6 @@ def test_workers_that_end_before_they_begin_end_the_campaign():
         list(workers.each(Unloadable(), range(8)))
 
 
-@pytest.mark.slow
-def test_a_process_stays_with_a_world_while_there_is_one_for_each(tmp_path):
-    path = tmp_path / "runs"
-    assert len(made(Listing(str(path)), 2, jobs(worlds=2, seeds=30))) == 60
-    changes = Counter[str]()
-    last = {}
-    for line in path.read_text().splitlines():
-        process, world = line.split()
-        changes[process] += last.get(process, world) != world
-        last[process] = world
-    assert max(changes.values()) <= 1, "at the end one helps the other"
-
-
 def test_results_that_nobody_wants_end_the_workers():
     with Pool(2) as workers:
         with contextlib.closing(workers.results(abs, range(3), in_order=False)) as running:
@@ -139,62 +122,6 @@ def test_one_process_is_this_one_and_so_are_those_of_a_worker():
     assert list(Pool(processes_for(1)).results(call_now, [os.getpid])) == [os.getpid()]
     with Pool(2) as workers:
         assert list(workers.results(processes_for, [3, 3])) == [0, 0]
-
-
-Run = tuple[str, int]  # the world, the seed
-
-
-def queue(runs, processes):
-    return Waiting(runs, processes, lambda run: run[0])
-
-
-@given(
-    st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 5)), unique=True, max_size=18),
-    st.integers(1, 4),
-    st.lists(st.tuples(st.sampled_from([None, *"abc"]), st.floats(1e-4, 10), st.booleans()), max_size=40),
-)
-def test_every_run_is_handed_out_once_whatever_is_asked_measured_and_put_back(runs, processes, asked):
-    waiting, made = queue(runs, processes), Counter[Run]()
-    left = len(runs)
-    for world, seconds, back in [*asked, *[(None, 1e-3, False)] * len(runs)]:
-        assert len(waiting) == left
-        chunk = waiting.chunk(world)
-        assert bool(chunk) == bool(left)
-        if back:
-            waiting.put_back(chunk)
-            continue
-        made.update(one.item for one in chunk)
-        left -= len(chunk)
-        if chunk:
-            waiting.measured(seconds * len(chunk), len(chunk))
-    assert made == Counter(runs)
-
-
-def test_chunks_take_two_seconds_and_shrink_at_the_end():
-    waiting = queue((("a", seed) for seed in range(1000)), 2)
-    assert len(waiting.chunk(None)) == 1, "nothing is measured yet"
-    waiting.measured(0.1)
-    assert len(waiting.chunk(None)) == CHUNK_SECONDS / 0.1
-    waiting.measured(1e-5, runs=1000)
-    assert len(waiting.chunk(None)) == min(LONGEST_CHUNK, -(-979 // 4))
-    while len(waiting) > 4:
-        waiting.chunk(None)
-    assert len(waiting.chunk(None)) == 1
-
-
-def test_runs_that_are_put_back_come_one_by_one_before_all_others():
-    waiting = queue((("a", seed) for seed in range(9)), 1)
-    waiting.measured(1e-3)
-    first = waiting.chunk(None)
-    waiting.put_back(first)
-    assert [waiting.chunk(None) for _ in first] == [[one] for one in first]
-
-
-def test_a_process_goes_on_with_its_world_then_takes_a_fresh_one_then_helps():
-    runs = [*(("a", seed) for seed in range(40)), ("b", 0), ("c", 0)]
-    waiting = queue(runs, 40)
-    worlds = [waiting.chunk(world)[0].group for world in (None, "a", None, "b", "b")]
-    assert worlds == ["a", "a", "b", "c", "a"]
 
 
 def test_kernels_that_workers_compile_are_reported_here(monkeypatch, worker):

@@ -8,12 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from antdrive.robots import Footprint, list_robots, load_robot
 from antdrive.robots.importing.urdf_import import import_urdf
 from antdrive.sim import Outcome, Rollout, Scenario, certify, run
-from antdrive.sim.log.certificate import _between_steps, _clearances
 from antdrive.views.film.meshes import robot_parts
 from antdrive.views.scene import Scene, contact_point
 from antdrive.worlds import Cruising, Disc, Task, World, import_barn, task_to_dict
@@ -70,21 +68,6 @@ def test_the_certificate_promises_no_more_than_a_cloud_of_points_that_is_swept_a
     assert certificate.bound - 1e-9 <= audit.between <= certificate.min_clearance + 0.005
 
 
-def test_nothing_comes_nearer_between_two_rows_than_the_bound(driven):
-    """Every 40th row is kept, so that much happens between them, and what happens is known from the rows left out."""
-    kept = replace(
-        driven,
-        record=replace(driven.record, physics_hz=6, control_hz=6),
-        **{key: getattr(driven, key)[::40] for key in ("t", "pose", "twist", "clearance", "movers")},
-    )
-    still, moving = _clearances(kept)
-    twist = np.array([np.abs(driven.twist[k : k + 41]).max(axis=0) for k in range(0, len(driven.t), 40)])
-    bound = _between_steps(replace(kept, twist=twist), driven.trajectories(), still, moving)
-    between = [driven.clearance[k : k + 41].min() for k in range(0, len(driven.t) - 40, 40)]
-    assert (bound[: len(between)] <= np.array(between) + 1e-9).all()
-    assert max(np.array(between) - bound[: len(between)]) > 0.02, "the bound is one that can fail"
-
-
 def test_a_collision_of_the_nose_is_a_collision_in_every_reading(hit):
     assert hit.outcome is Outcome.COLLIDED
     problems = " ".join(certify(hit).problems)
@@ -114,16 +97,6 @@ def test_a_robot_is_drawn_within_its_footprint(name):
         if not part.wheel:
             deepest = min(robot.footprint.depth(x, y) for x, y in part.mesh.vertices[:, :2].tolist())
             assert deepest >= -1e-9, part.colour
-
-
-def test_a_robot_file_is_what_the_second_audit_reads():
-    for name, path in list_robots().items():
-        foot = load_robot(name).footprint
-        raw = yaml.safe_load(path.read_text())["footprint"]
-        audit = least_clearance({"bounds": [-5, -5, 5, 5]}, raw, np.array([[3.0, 2.0, 0.7]] * 2), np.zeros((2, 2)), 240)
-        turned = np.array(foot.outline(64)) @ np.array([[np.cos(0.7), np.sin(0.7)], [-np.sin(0.7), np.cos(0.7)]])
-        expected = min(2 - turned[:, 0].max(), 3 - turned[:, 1].max())
-        assert audit.rows == pytest.approx(expected, abs=2e-3), name
 
 
 URDF = Path(__file__).parents[1] / "robots" / "importing" / "urdf"

@@ -12,8 +12,6 @@ from antdrive.base import caches
 from antdrive.base.caches import bits, cached, clear_caches
 from antdrive.planners import PLANNERS, Query
 from antdrive.sim import Engine, Scenario, run
-from antdrive.sim.physics import engine as engine_module
-from antdrive.sim.physics.bullet import bullet
 from antdrive.worlds import Disc, World, load_task, rasterise, save_task
 from antdrive.worlds.world import by_geometry
 from tests.records import COARSE
@@ -52,23 +50,6 @@ def fresh():
 def test_what_ran_before_changes_nothing(order, fresh):
     for name in order:
         assert outcome_of(name) == fresh[name], name
-
-
-def one_by_one(self, indices, shape, centres):
-    """Obstacles as they were built before: a call for each, drawn by Bullet as it likes."""
-    p, client = bullet(), self._client
-    for index, centre in zip(indices, centres, strict=True):
-        body = p.createMultiBody(0, shape, basePosition=centre, useMaximalCoordinates=1, physicsClientId=client)
-        p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_SLEEP, physicsClientId=client)
-        p.setCollisionFilterGroupMask(body, -1, 8, 4, physicsClientId=client)
-        self._bodies.add(index, body, shape)
-
-
-@pytest.mark.parametrize("name", ["slalom", "hit", "movers"])
-def test_bodies_built_in_one_call_behave_as_those_built_one_by_one(name, fresh, monkeypatch):
-    monkeypatch.setattr(Engine, "_build_obstacles", one_by_one)
-    monkeypatch.setattr(engine_module, "drawn_as", lambda client: -1)
-    assert outcome_of(name) == fresh[name]
 
 
 def test_body_numbers_count_ground_robot_and_obstacles_in_order(turtlebot):

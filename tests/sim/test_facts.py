@@ -5,6 +5,7 @@ import json
 import pytest
 
 from antdrive.base.files import as_json
+from antdrive.sim import Scenario
 from antdrive.sim.facts import FACTS, IN_RESULT, facts_of
 from antdrive.sim.verifying import COMPARED, false_claims
 
@@ -16,6 +17,11 @@ def test_what_a_log_proves_is_the_same_without_the_run(small_run):
 
 def test_every_fact_of_a_result_is_compared_but_long_ones():
     assert set(IN_RESULT) - set(COMPARED) == {"digest", "sights"}, "another digest is another log"
+
+
+def test_settings_without_a_key_of_their_own_are_among_the_settings_of_a_result():
+    exact = Scenario.of("forest", "astar", "jackal", footprint="exact")
+    assert exact.as_dict()["settings"] == {"footprint": "exact"}
 
 
 @pytest.mark.parametrize("name", [name for name in COMPARED if name not in ("time_limit_s", "frame")])

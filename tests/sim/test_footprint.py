@@ -91,15 +91,6 @@ def test_a_robot_that_turns_slower_than_planned_is_late_and_plans_again(noise):
     assert {(one.trigger, one.solved) for one in made.rollout.record.replans} == {("late", True)}
 
 
-@pytest.mark.parametrize("noise", [0.0, 1.0])
-def test_a_saved_drive_of_a_footprint_is_driven_again_bit_for_bit(driven, noise, tmp_path):
-    driven("jackal", noise).rollout.save(tmp_path / "run.npz")
-    loaded = Rollout.load(tmp_path / "run.npz")
-    check = replayed(loaded)
-    assert (check.exact, check.problems) == (True, ())
-    assert certify(loaded).certified
-
-
 def test_a_result_names_the_cell_that_the_footprint_was_planned_on(driven):
     made = driven("jackal", 0.0)
     log, result = made.rollout, made.as_dict()

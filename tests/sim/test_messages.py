@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 
 from antdrive.robots import Avoidance, Footprint
-from antdrive.runs.margins.choice import find_margin
 from antdrive.sim import Engine, Perception, ReplanPolicy, Rollout, Scenario
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import read_record
-from antdrive.sim.sensing import TrackingPolicy
 from antdrive.worlds import Cruising, Disc, Task, World
 from tests.messages import check_messages, numbered, said
 from tests.records import changed, made_up_record
@@ -140,7 +138,6 @@ def test_wrong_drives_settings_and_logs_are_refused_in_one_line(
             lambda: Perception(kind="all"), lambda: Perception(range=0.0), lambda: Avoidance(horizon=0.0),
             lambda: Avoidance(min_clearance=math.nan), lambda: ReplanPolicy(patience=-1.0),
             lambda: ReplanPolicy(patience=math.inf), lambda: ReplanPolicy(max_wait=math.nan),
-            lambda: TrackingPolicy(gap=0.0), lambda: next(find_margin(lambda *_: None, [1], resolution=0.5)),
         )),
         "engines": {
             "no trajectories": lambda: Engine(moving, turtlebot),

@@ -1,5 +1,6 @@
 """The scenario of a log drives the same log again; a forged value does not follow from any scenario."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +11,9 @@ from antdrive.planners import load_planner
 from antdrive.robots import Footprint, load_robot
 from antdrive.sim import Perception, Scenario, plan, run
 from antdrive.sim import rerun as rerun_module
-from antdrive.sim.driving.replay import ROUNDING, replay
 from antdrive.sim.log.consistency import wrong_optima
 from antdrive.sim.log.rollout import FORMS
-from antdrive.sim.rerun import mismatches, replayed, rerun
+from antdrive.sim.rerun import ROUNDING, ReplayCheck, mismatches, replayed, rerun
 from tests.records import COARSE, changed
 
 pytestmark = pytest.mark.xdist_group("reruns")
@@ -104,6 +104,14 @@ def test_the_first_row_that_differs_is_named(seen):
     assert f"replay: the rerun differs in tracks, from t = {tracks[-1, 0] / 80:.3f} s" in problems
     assert f"replay: the rerun differs in route, from point {len(seen.route)}" in problems
     assert sum("the rerun differs in" in problem for problem in problems) == 3
+
+
+@pytest.mark.parametrize("name", ["estimate", "actuated"])
+def test_noise_is_that_of_the_seed_to_a_millionth(name, noisy):
+    again = rerun(noisy)
+    for error, rounded in ((5e-7, True), (2e-6, False)):
+        (found,) = mismatches(replace(noisy, **{name: getattr(noisy, name) + error}), again)
+        assert (found.name, found.rounded) == (name, rounded)
 
 
 def test_headings_are_compared_on_the_circle(seen, seen_again):
@@ -222,12 +230,22 @@ def test_equal_arrays_excuse_no_rounding_of_the_record(small_run):
     assert [problem.split(":")[1] for problem in check.problems] == [" record.plan.length_m"]
 
 
-def test_the_larger_difference_of_replay_and_rerun_counts(small_run, monkeypatch):
-    log = small_run.rollout
-    opened = replace(replay(log), position=0.25, turn=0.5, twist=0.75)
-    monkeypatch.setattr(rerun_module, "replay", lambda rollout: opened)
-    check = replayed(log)
-    assert (check.position, check.turn, check.twist) == (0.25, 0.5, 0.75)
+def test_only_values_within_rounding_and_rows_that_differ_are_listed():
+    check = ReplayCheck(False, 0.1, 0.0, 0.0, ("replay: something",), ("pose",))
+    assert check.sentence.startswith("the replay differs: at most 0.1 m")
+    assert replace(check, problems=()).sentence.startswith("replayed within rounding (pose): at most")
+    assert replace(check, problems=(), rounded=()).sentence.startswith("replayed within rounding: at most")
+    assert replace(check, position=0.0).sentence == "the replay differs"
+    assert replace(check, position=math.nan).sentence == "not replayed"
+
+
+def test_rounding_is_a_millimetre(small_run):
+    log, again = small_run.rollout, rerun(small_run.rollout)
+    for error, rounded in ((0.0009, True), (0.0011, False)):
+        pose = log.pose.copy()
+        pose[100, 0] += error
+        (found,) = mismatches(replace(log, pose=pose), again)
+        assert found.rounded is rounded
 
 
 def test_lists_of_other_lengths_do_not_differ_by_rounding():

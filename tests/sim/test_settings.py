@@ -1,7 +1,7 @@
 """Every setting of a scenario is written, read, tabulated and keyed from its declaration."""
 
 from dataclasses import dataclass, fields
-from typing import Annotated, Any
+from typing import Any
 
 import pytest
 from annotated_types import Ge, Gt, Le
@@ -10,7 +10,7 @@ from antdrive.planners import SMOOTHINGS
 from antdrive.runs.campaigns.rows import GRID
 from antdrive.sim import Scenario
 from antdrive.sim.forms import columns_of, scenario_fields, setting_words, written
-from antdrive.sim.settings import SETTINGS, Setting, declared, part_of_key
+from antdrive.sim.settings import SETTINGS, declared, part_of_key, setting
 
 #: For each setting a value that is not its default, as files write it, with its cell in a table and its words.
 WRITTEN: dict[str, tuple[Any, Any, list[str] | None]] = {
@@ -74,10 +74,10 @@ def test_later_settings_are_part_of_a_key_only_beyond_their_defaults():
 class Made:
     """A record with settings of every kind of number."""
 
-    share: Annotated[float, Ge(0), Le(1), Setting("a share", "Robot")] = 0.5
-    size: Annotated[float | None, Gt(0), Setting("a size", "Robot")] = None
-    count: Annotated[int, Ge(1), Setting("a count", "Robot")] = 1
-    kind: Annotated[str, Setting("a kind", "Robot", choices=("a", "b"))] = "a"
+    share: float = setting(0.5, "a share", "Robot", "", Ge(0), Le(1))
+    size: float | None = setting(None, "a size", "Robot", "", Gt(0))
+    count: int = setting(1, "a count", "Robot", "", Ge(1))
+    kind: str = setting("a", "a kind", "Robot", choices=("a", "b"))
 
 
 BAD = (

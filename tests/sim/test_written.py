@@ -16,7 +16,7 @@ from antdrive.planners import AStar, load_planner
 from antdrive.robots import list_robots
 from antdrive.sim import Scenario, run
 from antdrive.sim.log.record import DriveRecord, settings_of
-from antdrive.sim.recorded import command_of, false_settings, false_words, written_of
+from antdrive.sim.recorded import command_of, false_words, written_of
 from antdrive.sim.settings import LOCALISATIONS, SETTINGS, SMOOTHINGS
 from antdrive.sim.written import Written
 from antdrive.worlds import load_task
@@ -220,17 +220,17 @@ FORGED = {
 @pytest.mark.parametrize("key", FORGED)
 def test_a_written_word_that_the_record_contradicts_is_named(key, small_run):
     record = small_run.rollout.record
-    assert [*false_words(record), *false_settings(record)] == []
+    assert [*false_words(record, settings=True)] == []
     forged = dataclasses.replace(record, written=dataclasses.replace(written_of(record), **FORGED[key]).plain())
-    assert f"record.written.{key}:" in " ".join([*false_words(forged), *false_settings(forged)])
+    assert f"record.written.{key}:" in " ".join(false_words(forged, settings=True))
     assert command_of(forged) is None
 
 
 def test_a_mapless_drive_contradicts_no_word_of_its_own():
     s = Scenario.of("slalom", "dstar-lite", map="none", localisation="odometry", time_limit=0.5)
-    assert [*false_settings(run(s).rollout.record)] == []
+    assert [*false_words(run(s).rollout.record, settings=True)] == []
 
 
 def test_settings_that_only_movers_bring_to_bear_are_unknown_without_any():
     s = Scenario.of("empty", "astar", localisation="odometry", replanning=None, avoidance=None, time_limit=0.5)
-    assert [*false_settings(run(s).rollout.record)] == []
+    assert [*false_words(run(s).rollout.record, settings=True)] == []

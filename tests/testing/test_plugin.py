@@ -349,7 +349,7 @@ def test_junit_properties_and_the_summary_of_a_ci_run(accepted, monkeypatch):
     assert {"drive.min_clearance_m", "drive.duration_s", "drive.results"} <= told.keys()
     text = page.read_text()
     assert text.startswith("before\n### Drives: 2 of 3 passed\n")
-    assert "| a.drive.yaml::hit&#91;0&#93; | collided |" in text
+    assert "| a.drive.yaml::hit[0] | collided |" in text
     assert "    antdrive check 'a.drive.yaml::hit[0]'\n" in text
 
 

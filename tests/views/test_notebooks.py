@@ -112,8 +112,10 @@ def test_small_films_are_embedded_and_large_ones_linked(tmp_path, monkeypatch, n
 
 
 def test_a_bar_shows_in_notebooks_and_on_request(small_scenario, small_run, capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "100")
     run(small_scenario, planned=(small_run.grid, small_run.plan), progress=True)
-    assert "astar in small [" in capsys.readouterr().err
+    assert "astar in small" in capsys.readouterr().err
     for wanted, shown in ((None, False), (True, True), (False, False)):
         with progress_bar(wanted, "campaign") as update:
             update(3, 3)

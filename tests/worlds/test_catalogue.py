@@ -80,10 +80,6 @@ def test_the_office_is_the_generators():
     assert (task.world.bounds, task.start, task.goal) == (made.world.bounds, made.start, made.goal)
 
 
-def test_no_obstacle_is_listed_twice(task):
-    assert len(set(task.world.obstacles)) == len(task.world.obstacles)
-
-
 @pytest.mark.parametrize(
     ("name", "points", "radius", "first", "last"),
     [("han2007-aco", ACO, 1, 1, 20), ("han2007-ga", GA, 1, 0, 20), ("han2007-single", [(10, 10)], 5, 0, 20)],
@@ -116,10 +112,6 @@ def test_hasans_worlds_are_recreated_in_fifty_by_fifty_cells(case):
     assert set(np.unique([disc.radius for disc in task.world.obstacles])) == {task.cell / 2}
     assert (moving.world.obstacles, moving.start, moving.goal) == (task.world.obstacles, task.start, task.goal)
     assert (len(task.world.movers), len(moving.world.movers)) == (0, 1)
-
-
-def test_hasans_last_two_cases_have_one_environment():
-    assert load_task("hasan-5e").world.obstacles == load_task("hasan-5f").world.obstacles
 
 
 @pytest.mark.parametrize("case", HASAN)

@@ -31,18 +31,6 @@ def test_an_empty_room_is_one_room_and_its_share_is_that_of_its_cells():
     assert result.share == (30 * 20) / (40 * 30)
 
 
-@pytest.mark.parametrize(
-    ("inflate", "reached", "passed"), [(0.2, 2, (True, True)), (0.6, 2, (False, True)), (0.8, 1, (False, False))]
-)
-def test_two_doors_between_two_rooms(inflate, reached, passed):
-    result = covered(two_rooms([(1.5, 0.9), (4.5, 1.4)]), inflate)
-    assert result.room_count == 2
-    assert len(result.rooms_reached) == reached
-    assert [door.width for door in result.doors] == pytest.approx([0.9, 1.4])
-    assert [door.at for door in result.doors] == [pytest.approx((4.0, 1.5)), pytest.approx((4.0, 4.5))]
-    assert tuple(door.passed for door in result.doors) == passed
-
-
 @pytest.mark.parametrize("cell", [0.1, 0.25])
 def test_a_door_that_is_reached_from_one_side_only_is_not_passed(cell):
     """The robot fits beside the wall's line, where the gap is a little wider, but not on it."""

@@ -54,15 +54,6 @@ def test_moves_are_as_defined_in_a_crowd(seed, cell, inflate):
     assert (bits(grid)[sure] == expected[sure].astype(bool)).all()
 
 
-@settings(max_examples=25)
-@given(worlds(), st.floats(0.4, 1.5), st.floats(0.0, 0.6))
-def test_moves_are_as_defined(world, cell, inflate):
-    grid = rasterise(world, cell, inflate)
-    expected = moves_by_force(grid, world)
-    sure = ~np.isnan(expected)
-    assert (bits(grid)[sure] == expected[sure].astype(bool)).all()
-
-
 @pytest.mark.parametrize(("cell", "radius", "on_lattice"), [(0.05, 0.4, False), (0.25, 0.75, True), (0.25, 0.5, True)])
 def test_moves_are_as_defined_where_discs_are_much_larger_than_cells(cell, radius, on_lattice):
     """150 columns; on the lattice of centres many lie exactly on a rim, and all numbers here have no rounding errors."""
@@ -99,14 +90,6 @@ def test_a_cell_is_free_when_the_robot_fits_at_its_centre(world, cell, inflate):
     for r, c in np.argwhere(np.ones(grid.shape)):
         clearance = clearance_of_point(world, *grid.xy([(r, c)])[0])
         assert abs(clearance - inflate) < 1e-9 or grid.free[r, c] == (clearance > inflate)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_every_move_can_be_taken_back(seed):
-    moves = bits(rasterise(crowd(seed), 0.25, 0.2))
-    for r, c, k in np.argwhere(moves):
-        dr, dc = DIRECTIONS[k]
-        assert moves[r + dr, c + dc, (k + 4) % 8]
 
 
 def test_the_order_of_obstacles_changes_nothing():

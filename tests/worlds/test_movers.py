@@ -105,14 +105,6 @@ def test_before_the_first_keyframe_and_after_the_last_it_stands():
     np.testing.assert_allclose(velocity, [(0, 0), (2, 0), (0, 2), (0, 2), (0, 0)])
 
 
-def test_pingpong_returns_along_the_same_path():
-    mover = Keyframed(radius=0.3, keyframes=ELL)
-    np.testing.assert_allclose(at(mover, [4.5, 5.0, 6.0, 7.0, 8.0]), [(6, 3), (6, 2), (4, 2), (2, 2), (4, 2)])
-    np.testing.assert_allclose(
-        trajectories(mover).velocities([4.0, 4.5, 5.0, 7.0])[:, 0], [(0, -2), (0, -2), (-2, 0), (2, 0)]
-    )
-
-
 def test_teleport_appears_at_the_first_place_and_says_when():
     mover = Keyframed(radius=0.3, keyframes=ELL, loop="teleport")
     moving = trajectories(mover)
@@ -226,13 +218,6 @@ def test_wanderers_draw_from_the_runs_seed_unless_they_have_one_of_their_own():
     assert (one == trajectories(own, shared, shared, seed=0).positions(FINE)).all()
 
 
-def test_extending_a_walk_does_not_change_it():
-    mover = Wandering(radius=0.2, cell=0.5, period=0.4)
-    whole, parts = trajectories(mover, obstacles=POSTS), trajectories(mover, obstacles=POSTS)
-    asked = [parts.positions(t)[0] for t in FINE]
-    assert (whole.positions(FINE) == np.array(asked)).all()
-
-
 # All kinds
 
 KINDS = [
@@ -336,11 +321,6 @@ def test_the_example_of_the_format_is_read(tmp_path):
         Cruising(radius=0.3, height=0.4, position=(5.0, 2.0), velocity=(1.0, 0.5)),
         Wandering(radius=0.2, phase=3.0, cell=0.5, period=0.8, start=(7.0, 7.0), seed=4),
     )
-
-
-def test_keys_that_a_task_does_not_need_are_not_written():
-    assert "movers" not in task_to_dict(Task(World("w", BOX), (1, 1, 0), (2, 2)))
-    assert "time_limit" not in task_to_dict(Task(World("w", BOX), (1, 1, 0), (2, 2)))
 
 
 #: Movers that cannot be; `test_messages.yml` has what is said of them.

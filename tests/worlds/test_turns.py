@@ -1,6 +1,5 @@
 """Grids with turns: labels, moves, and searches over their nodes, against loops that share no code."""
 
-import heapq
 import math
 
 import numpy as np
@@ -93,39 +92,6 @@ def test_arrays_are_read_only_and_discs_have_none(made):
     assert not rasterise(world, 0.2, 0.6).turns
 
 
-def shortest(edges, start, goal):
-    """The length of the shortest path by Dijkstra's algorithm over a dictionary."""
-    best, open_list = {start: 0.0}, [(0.0, 0, start)]
-    while open_list:
-        cost, _, node = heapq.heappop(open_list)
-        if node[0] == goal:
-            return cost
-        if cost > best[node]:
-            continue
-        for k, to in edges.get(node, ()):
-            new = cost + (math.sqrt(2) if k % 2 else 1.0)
-            if new < best.get(to, math.inf) - 1e-12:
-                best[to] = new
-                heapq.heappush(open_list, (new, len(best), to))
-    return math.inf
-
-
-@pytest.mark.parametrize("name", ["astar", "dijkstra"])
-def test_searches_find_the_shortest_path_over_turns(made, name):
-    _, grid, label, edges = made
-    rng, cols, found = np.random.default_rng(3), grid.shape[1], 0
-    for _ in range(60):
-        (r0, c0), (r1, c1) = np.argwhere(grid.free)[rng.integers(0, np.count_nonzero(grid.free), 2)].tolist()
-        k = next(k for k in range(8) if grid.turns.label[r0 * cols + c0, k] >= 0)
-        query = Query(grid, (r0, c0), (r1, c1), start_label=int(grid.turns.label[r0 * cols + c0, k]))
-        plan = load_planner(name).plan(query, rng)
-        length = shortest(edges, ((r0, c0), label[(r0, c0), k]), (r1, c1))
-        assert plan.cost == pytest.approx(0.2 * length)
-        assert validate_plan(query, plan) == ""
-        found += plan.solved
-    assert 10 < found < 60
-
-
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10_000), st.floats(-math.pi, math.pi))
 def test_the_ends_of_a_task_lead_to_its_path(seed, yaw):
@@ -155,34 +121,6 @@ def test_a_turn_that_is_not_free_is_no_plan():
     back = type(plan)(status=PlanStatus.SOLVED, cells=cells, cost=0.3)
     problem = validate_plan(Query(grid, (row, 10), (row, 11), start_label=start), back)
     assert problem == f"cells: step 2 from ({row}, 12) to ({row}, 11) is no allowed move"
-
-
-def test_blocked_cells_lose_the_moves_into_and_out_of_them(made):
-    _, grid, label, edges = made
-    rng, cols = np.random.default_rng(5), grid.shape[1]
-    blocked = rng.random(grid.shape) < 0.15
-    at = tuple(np.argwhere(grid.free)[0].tolist())
-    replanner = replanner_for(load_planner("astar"), Query(grid, at, at), rng)
-    replanner.block(np.argwhere(blocked))
-    left = replanner.query.grid
-    assert left.free.tolist() == (grid.free & ~blocked).tolist()
-    kept = {
-        node: [(k, to) for k, to in moves if not blocked[node[0]] and not blocked[to[0]]]
-        for node, moves in edges.items()
-    }
-    for i in range(grid.free.size):
-        at = divmod(i, cols)
-        union = {k for k in range(8) if any(move == k for move, _ in kept.get((at, label[at, k]), ()))}
-        assert {k for k in range(8) if int(left.moves[at]) >> k & 1} == union
-    found = 0
-    for (r0, c0), (r1, c1) in rng.choice(np.argwhere(left.free), (40, 2)).tolist():
-        k = next(k for k in range(8) if grid.turns.label[r0 * cols + c0, k] >= 0)
-        query = Query(left, (r0, c0), (r1, c1), start_label=int(grid.turns.label[r0 * cols + c0, k]))
-        plan = load_planner("astar").plan(query, rng)
-        assert plan.cost == pytest.approx(0.2 * shortest(kept, ((r0, c0), label[(r0, c0), k]), (r1, c1)))
-        assert validate_plan(query, plan) == ""
-        found += plan.solved
-    assert 5 < found < 40
 
 
 def test_planners_for_the_disc_and_agents_refuse_turns(made):

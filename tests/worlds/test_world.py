@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from antdrive.base.errors import FieldError
-from antdrive.base.records import derived
+from antdrive.base.records import unchecked_copy
 from antdrive.worlds import Cruising, Disc, Route, Task, World
 from antdrive.worlds.world import PointWorld
 
@@ -42,7 +42,7 @@ def test_it_has_the_cylinders_of_its_rows():
 def test_a_derived_task_has_the_other_values_unchecked_and_the_rest_of_the_first():
     task = Task(World("a", BOUNDS), (1.0, 1.0, 0.0), (2.0, 2.0), goal_tolerance=0.1)
     covered = World("b", BOUNDS, (Disc(1.0, 1.0, 0.3),))
-    made = derived(task, world=covered)
+    made = unchecked_copy(task, world=covered)
     assert (made.world, made.start, made.goal, made.goal_tolerance) == (covered, task.start, task.goal, 0.1)
     assert task.world.name == "a"
     with pytest.raises(FieldError, match="inside obstacles"):

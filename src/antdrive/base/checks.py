@@ -8,7 +8,7 @@ import json
 import math
 import numbers
 import os
-from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, cast
 
@@ -158,6 +158,15 @@ def yaml_number(value: float) -> str:
     text = repr(float(value))
     mantissa, mark, exponent = text.partition("e")
     return f"{mantissa}.0e{exponent}" if mark and "." not in mantissa else text
+
+
+def yaml_flow(value: Any, number: Callable[[float], str] = yaml_number) -> str:
+    """Format plain data on one line of YAML, with `number` for its floats."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {yaml_flow(inner, number)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(yaml_flow(inner, number) for inner in value) + "]"
+    return number(value) if isinstance(value, float) else str(value)
 
 
 def _mapping_of(schema: Schema) -> str:

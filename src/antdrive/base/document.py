@@ -6,7 +6,7 @@ import contextlib
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -111,7 +111,7 @@ def parse_document(text: str, source: str) -> Document:
         raise input_error(source, "is empty")
     builder = _Builder(Document(source, None, {}), TOO_MUCH if "*" in text else TOO_MANY, table=table)
     data = builder.build(node, ())
-    return Document(source, data, builder.lines if table is None else _RowLines(table, builder.lines))
+    return Document(source, data, builder.lines)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,30 +142,6 @@ class _Table:
         (mark, value) = matches[0]
         here = (mark.line, mark.column) == (self.line, 0)
         return here and isinstance(value, yaml.SequenceNode) and not value.value
-
-
-class _RowLines(Mapping[Location, int]):
-    """Line numbers of the values in a table's rows and in the text around it."""
-
-    def __init__(self, table: _Table, around: Mapping[Location, int]) -> None:
-        self._table, self._around = table, around
-
-    def __getitem__(self, location: Location) -> int:
-        table = self._table
-        match location:
-            case (key, int(row), *inner) if key == table.key and 0 <= row < len(table.rows) and len(inner) < 2:
-                if not inner or inner[0] in table.rows[row]:
-                    return table.line + 2 + row
-        return self._around[location]
-
-    def __iter__(self) -> Iterator[Location]:
-        yield from self._around
-        for i, row in enumerate(self._table.rows):
-            yield (self._table.key, i)
-            yield from ((self._table.key, i, key) for key in row)
-
-    def __len__(self) -> int:
-        return len(self._around) + sum(1 + len(row) for row in self._table.rows)
 
 
 def _compose_around(text: str) -> tuple[yaml.Node | None, _Table | None]:
@@ -288,6 +264,10 @@ class _Builder:
         self.count += sum(1 + len(row) for row in table.rows)
         if self.count > MAX_VALUES:
             raise self.document.error((table.key,), self.beyond)
+        for i, row in enumerate(table.rows):
+            line = table.line + 2 + i
+            self.lines[table.key, i] = line
+            self.lines.update({(table.key, i, key): line for key in row})
         return table.rows
 
     def mapping(self, node: yaml.MappingNode, location: Location) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import stat
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 _ROOT = Path(__file__).parent.parent  # the package antdrive
@@ -88,13 +88,10 @@ def sources_stamp(file: Path | None = None) -> str:
     Modules are imported lazily, so a file edited while the process runs mixes two versions in it. Code compiled then belongs to
     neither version: its stamp covers both texts.
     """
-    first, then, imported = _first_state()
+    first, imported = _first_state()
     paths = sorted(_closure(file, imported)) if file in imported else list(first)
-    stamp = _sha(first[path] for path in paths)
-    if _state(first) == then:
-        return stamp
-    texts = [path.read_bytes() if path.exists() else b"" for path in paths]
-    return stamp if texts == [first[path] for path in paths] else _sha([*(first[path] for path in paths), *texts])
+    texts, now = [first[path] for path in paths], [path.read_bytes() if path.exists() else b"" for path in paths]
+    return hashlib.sha256(b"".join(texts if now == texts else texts + now)).hexdigest()
 
 
 def text_of(file: Path) -> bytes:
@@ -103,10 +100,9 @@ def text_of(file: Path) -> bytes:
 
 
 @functools.cache
-def _first_state() -> tuple[dict[Path, bytes], list[tuple[int, int]], dict[Path, set[Path]]]:
-    """Return the texts, `_state` and imported kernel files of all kernel files at the first call."""
+def _first_state() -> tuple[dict[Path, bytes], dict[Path, set[Path]]]:
+    """Return the texts and the imported kernel files of all kernel files at the first call."""
     paths = [path for package in PACKAGES for path in sorted((_ROOT / package).rglob("_kernels*.py"))]
-    state = _state(paths)  # before reading, to detect edits in between
     texts = {path: path.read_bytes() for path in paths}
     named: dict[bytes, set[Path]] = {}
     for path in paths:
@@ -116,7 +112,7 @@ def _first_state() -> tuple[dict[Path, bytes], list[tuple[int, int]], dict[Path,
         path: set().union(*(named.get(name, ()) for line in _IMPORT.findall(text) for name in _NAME.findall(line)))
         for path, text in texts.items()
     }
-    return texts, state, imported
+    return texts, imported
 
 
 def _closure(file: Path, imported: dict[Path, set[Path]]) -> set[Path]:
@@ -129,25 +125,6 @@ def _closure(file: Path, imported: dict[Path, set[Path]]) -> set[Path]:
     return found
 
 
-def _state(paths: Iterable[Path]) -> list[tuple[int, int]]:
-    """Return modification times and sizes of files; zeros for missing ones."""
-    found = []
-    for path in paths:
-        try:
-            status = os.stat(path)
-            found.append((status.st_mtime_ns, status.st_size))
-        except OSError:
-            found.append((0, 0))
-    return found
-
-
-def _sha(texts: Iterable[bytes]) -> str:
-    sha = hashlib.sha256()
-    for text in texts:
-        sha.update(text)
-    return sha.hexdigest()
-
-
 def cache_folder() -> Path | None:
     """Return the folder for machine code; None without a writable folder.
 
@@ -157,7 +134,7 @@ def cache_folder() -> Path | None:
     given = os.environ.get("NUMBA_CACHE_DIR")
     for folder in (*([Path(given)] if given else []), *default_folders()):
         new = not os.path.exists(folder)
-        if _writable(folder):
+        if writable(folder):
             if new:
                 with contextlib.suppress(OSError):
                     (folder / ".gitignore").write_text("*\n")
@@ -167,11 +144,16 @@ def cache_folder() -> Path | None:
 
 def default_folders() -> tuple[Path, Path]:
     """Return the folders that numba itself tries for antdrive's kernels."""
-    user = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
-    return _ROOT / "base" / "__pycache__", user / "numba"
+    return _ROOT / "base" / "__pycache__", user_cache() / "numba"
 
 
-def _writable(folder: Path) -> bool:
+def user_cache() -> Path:
+    """Return the user's cache folder."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
+
+
+def writable(folder: Path) -> bool:
+    """Return whether files can be written into a folder, made if it is missing."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -191,7 +173,7 @@ def _private_folder() -> Path | None:
         folder.mkdir(mode=0o700, exist_ok=True)
         found = folder.lstat()
         private = user is None or (found.st_uid == user and not found.st_mode & 0o077)
-        if stat.S_ISDIR(found.st_mode) and private and _writable(folder):
+        if stat.S_ISDIR(found.st_mode) and private and writable(folder):
             return folder
         return Path(tempfile.mkdtemp(prefix="antdrive-cache-"))
     except OSError:  # includes a missing folder for temporary files

@@ -1,4 +1,4 @@
-"""Progress bars of functions called from Python: shown in notebooks, elsewhere on request."""
+"""Progress on stderr: of commands, and of functions called from Python, shown in notebooks and elsewhere on request."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ import importlib
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from typing import Any
 
-WIDTH = 24  # characters of a bar
-PAUSE = 0.1  # between two updates of a bar [s]
+WIDTH = 24  # characters of a bar in a notebook
+PAUSE = 0.1  # between two updates of a notebook's cell [s]
+NOTED = 60.0  # between two lines where stderr is no terminal [s]
 
 
 def in_notebook() -> bool:
@@ -21,7 +23,7 @@ def in_notebook() -> bool:
 
 @contextmanager
 def progress_bar(wanted: Callable[..., None] | bool | None, label: str) -> Iterator[Callable[..., None]]:
-    """Yield a callback that takes a fraction, or finished and all runs, and shows them on stderr.
+    """Yield a callback that takes a fraction, or finished and all runs, and shows them as `bar` does.
 
     Args:
         wanted: a callback to use instead; True: show a bar; False: show nothing; None: show a bar in a notebook
@@ -29,39 +31,118 @@ def progress_bar(wanted: Callable[..., None] | bool | None, label: str) -> Itera
     """
     if callable(wanted):
         yield wanted
-        return
-    if not (in_notebook() if wanted is None else wanted):
+    elif in_notebook() if wanted is None else wanted:
+        with bar(label) as update:
+            yield update
+    else:
         yield lambda *done: None
-        return
-    show, until = _place(), 0.0
 
-    def update(done: float, size: float | None = None) -> None:
+
+@contextmanager
+def bar(label: str) -> Iterator[Callable[..., None]]:
+    """Show progress with pace and time left. Yields a function that takes the completed fraction, or finished and all runs.
+
+    The pace excludes what was completed before the first call.
+    """
+    with shown_progress(label) as show:
+        first: list[float] = []
+
+        def update(done: float, size: int | None = None) -> None:
+            now = time.monotonic()
+            first[:] = first or [done, now]
+            made, seconds = done - first[0], now - first[1]
+            notes = [f"{done:4.0%}" if size is None else f"{done} of {size} runs"]
+            if made > 0:
+                notes += [] if size is None else [f"{made / max(seconds, 1e-9):.1f} runs/s"]
+                notes.append(f"{duration(((size or 1) - done) * seconds / made)} left")
+            show(", ".join(notes), done, 1 if size is None else size)
+
+        yield update
+
+
+@contextmanager
+def shown_progress(label: str) -> Iterator[Callable[..., None]]:
+    """Show progress: a bar on a terminal, text in a notebook's cell, elsewhere a line each minute.
+
+    Yields a function that takes a note, the completed and the total work; the default is unknown.
+    """
+    display = _in_cell if in_notebook() else _on_terminal if sys.stderr.isatty() else _in_lines
+    with display(label) as show:
+        yield show
+
+
+@contextmanager
+def _in_cell(label: str) -> Iterator[Callable[..., None]]:
+    output = importlib.import_module("IPython.display")
+    cell, until = output.display(output.HTML(""), display_id=True), 0.0
+
+    def show(note: str = "", completed: float = 0, total: float | None = None) -> None:
         nonlocal until
-        fraction = done / (size or 1)
+        fraction = completed / total if total else 0.0
         if fraction >= 1 or time.monotonic() >= until:
-            counted = "" if size is None else f", {done} of {size} runs"
-            show(f"{label} [{'#' * round(WIDTH * fraction):{WIDTH}}] {fraction:4.0%}{counted}")
+            text = f"{label} [{'#' * round(WIDTH * fraction):{WIDTH}}] {note}"
+            cell.update(output.HTML(f"<pre>{html.escape(text)}</pre>"))
             until = time.monotonic() + PAUSE
 
     try:
-        update(0.0, None)
-        yield update
+        show()
+        yield show
     finally:
-        show("")
+        cell.update(output.HTML(""))
 
 
-def _place() -> Callable[[str], None]:
-    """Return a function that shows a text instead of its last one: in a notebook's cell, which keeps none, or on stderr."""
-    if in_notebook():
-        output = importlib.import_module("IPython.display")
-        cell = output.display(output.HTML(""), display_id=True)
-        return lambda text: cell.update(output.HTML(f"<pre>{html.escape(text)}</pre>" if text else ""))
-    width = 0
+@contextmanager
+def _on_terminal(label: str) -> Iterator[Callable[..., None]]:
+    """Show a transient bar, and the number of kernels compiled meanwhile."""
+    from rich import progress
+    from rich.console import Console
 
-    def show(text: str) -> None:
-        nonlocal width
-        sys.stderr.write(f"\r{text:{width}}" if text else f"\r{'':{width}}\r")
-        sys.stderr.flush()
-        width = len(text)
+    from antdrive.base import kernel_cache
 
-    return show
+    columns: tuple[Any, ...] = (progress.TextColumn("{task.description}"), progress.BarColumn())
+    columns += (progress.TextColumn("{task.fields[note]}"), progress.TimeElapsedColumn())
+    on_top = sys.stdout.isatty()  # print above the bar on a terminal; leave a redirected stdout alone
+    settings: dict[str, Any] = {"transient": True, "refresh_per_second": 4, "redirect_stdout": on_top}
+    with progress.Progress(*columns, console=Console(stderr=True), **settings) as rows:
+        task, kernels = rows.add_task(label, total=None, note=""), 0
+
+        def compiles(name: str) -> None:
+            nonlocal kernels
+            kernels += 1
+            before(name)
+            rows.update(task, description=f"{label} (kernels compiled once: {kernels})")
+
+        def show(note: str = "", completed: float = 0, total: float | None = None) -> None:
+            rows.update(task, note=note, completed=completed, total=total)
+
+        before, kernel_cache.on_compile = kernel_cache.on_compile, compiles
+        try:
+            yield show
+        finally:
+            kernel_cache.on_compile = before
+
+
+@contextmanager
+def _in_lines(label: str) -> Iterator[Callable[..., None]]:
+    noted = time.monotonic()
+
+    def show(note: str = "", completed: float = 0, total: float | None = None) -> None:
+        nonlocal noted
+        if (now := time.monotonic()) - noted >= NOTED and (total is None or completed < total):
+            noted = now
+            with suppress(OSError):
+                sys.stderr.write(f"antdrive: {label}: {note}\n")
+                sys.stderr.flush()
+
+    yield show
+
+
+def duration(seconds: float) -> str:
+    """Format a duration: 45 s, 12 min, 3 h 20 min, 2 d 4 h."""
+    minutes = round(seconds / 60)
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    if minutes < 90:
+        return f"{minutes} min"
+    hours = minutes // 60
+    return f"{hours} h {minutes % 60} min" if hours < 48 else f"{hours // 24} d {hours % 24} h"

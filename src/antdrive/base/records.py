@@ -52,7 +52,7 @@ def ranges_of(kind: Hashable) -> Mapping[str, tuple[float, float]]:
     return ranges
 
 
-def derived(record: R, **changes: Any) -> R:
+def unchecked_copy(record: R, **changes: Any) -> R:
     """Return a copy of a dataclass with other fields or cached values, unchecked: they are made of checked ones."""
     made = object.__new__(type(record))
     vars(made).update({name: getattr(record, name) for name in cast(Any, record).__dataclass_fields__} | changes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 import textwrap
@@ -74,3 +75,8 @@ def file_lines(files: Mapping[str, object]) -> Iterator[str]:
     """Return one line per written file: name and path."""
     width = max([8, *map(len, files)])
     return (f"  {name:{width}} {path}" for name, path in files.items())
+
+
+def markdown_text(text: str) -> str:
+    """Escape a text for Markdown, its tables and HTML blocks; brackets only where they could be a link."""
+    return re.sub(r"[&<>|`*_~\\@#]|\](?=[(\[:])|\[(?=\^)", lambda found: f"&#{ord(found[0])};", text)

@@ -20,7 +20,7 @@ from antdrive.cli.listings import version_line
 from antdrive.cli.options import with_plan_limit
 from antdrive.sim.settings import PANELS
 
-SETTINGS: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
+TYPER: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
 
 #: Short forms of options, the same in every command.
 SHORT = {"out": "-o", "planner": "-p", "robot": "-r", "world": "-w", "jobs": "-j"}
@@ -98,7 +98,7 @@ class _Commands(UserDict[str, Any]):
     def __getitem__(self, name: str) -> Any:
         command = self.data[name]
         if isinstance(command, Command):
-            alone = typer.Typer(**SETTINGS)
+            alone = typer.Typer(**TYPER)
             function = command.function(name)
             alone.command(name, cls=_Panelled)(with_plan_limit(function) if "plans" in command.marks else function)
             made: Any = typer.main.get_command(alone)
@@ -183,10 +183,10 @@ def application() -> Any:
         help=ABOUT,
         no_args_is_help=True,
         context_settings={"help_option_names": ["-h", "--help"]},
-        **SETTINGS,
+        **TYPER,
     )
     for name, kind in (("worlds", _Group), ("robots", _RobotsGroup)):
-        group = typer.Typer(cls=kind, help=GROUPS[name], no_args_is_help=kind is _Group, **SETTINGS)
+        group = typer.Typer(cls=kind, help=GROUPS[name], no_args_is_help=kind is _Group, **TYPER)
         group.callback()(lambda: None)  # makes it a group before it has commands
         app.add_typer(group, name=name)
     app.callback()(_global_options)

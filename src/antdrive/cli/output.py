@@ -45,7 +45,7 @@ def film_drives(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str
 
 def print_idle_settings(scenarios: Sequence[Scenario], given: Collection[str] = ()) -> None:
     """Print the settings that cannot act on stderr; `given` as in `idle_notes`."""
-    from antdrive.sim.effects import idle_notes
+    from antdrive.sim.idle_settings import idle_notes
 
     for note in idle_notes(scenarios, given):
         print_error(note)

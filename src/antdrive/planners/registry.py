@@ -166,8 +166,8 @@ def _error(key: str, problem: str) -> InputError:
 
 
 def _unfit(message: str) -> InputError:
-    """Return the error of a third-party planner that cannot be used; the message names it."""
-    return InputError(visible(message), "planner")
+    """Return the error of a third-party planner that cannot be used; the message names it, the problem without the key."""
+    return InputError(visible(message), "planner", visible(message.removeprefix("planner ")))
 
 
 def _whole(value: Any) -> int:

@@ -24,7 +24,7 @@ _Size = Annotated[float, Field(gt=0)]
 _Place: TypeAlias = tuple[float, float]
 
 
-_FORMS = (
+_FOOTPRINT_HELP = (
     "write {radius: 0.18} for a disc, {length: 0.5, width: 0.4} for a rectangle, both with centre: [0.1, 0] if offset "
     "from the axle, or {polygon: [[0.3, -0.2], [0.3, 0.2], [-0.2, 0.2], [-0.2, -0.2]]}"
 )
@@ -54,7 +54,7 @@ class FootprintEntry(BaseModel):
     def _one_kind(self) -> FootprintEntry:
         given = {key for key in ("radius", "length", "width", "polygon") if getattr(self, key) is not None}
         if given not in ({"radius"}, {"length", "width"}, {"polygon"}) or (self.centre and self.polygon):
-            raise ValueError(_FORMS)
+            raise ValueError(_FOOTPRINT_HELP)
         return self
 
     def footprint(self) -> Footprint:
@@ -82,7 +82,7 @@ def _robot_file() -> Any:
             OneLine,
             Field(min_length=1, max_length=200, description="the robot's name; by default the file's name"),
         ),
-        "footprint": (FootprintEntry, Field(description=f"{_FORMS} [m]")),
+        "footprint": (FootprintEntry, Field(description=f"{_FOOTPRINT_HELP} [m]")),
     }
     return create_model("RobotFile", __config__=STRICT, __doc__=RobotSpec.__doc__, **values)
 

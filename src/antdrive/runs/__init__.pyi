@@ -1,9 +1,9 @@
 from .comparing import Comparison as Comparison
 from .comparing import compare as compare
+from .failures.failure import Attempt as Attempt
 from .failures.failure import Failure as Failure
 from .failures.failure import failure_of as failure_of
 from .failures.failure import parse_bound as parse_bound
-from .failures.handover import Handover as Handover
 from .failures.handover import write_suite as write_suite
 from .failures.hunt import Finding as Finding
 from .failures.hunt import Hunt as Hunt

@@ -1,4 +1,4 @@
-"""Workers on this or other machines through dask's `distributed`. They execute chunks of runs that are safe to repeat."""
+"""Workers on this or other machines through dask's `distributed`. Runs are safe to repeat."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import os
 import re
 import threading
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from antdrive.base import system
 from antdrive.base.errors import input_error
 from antdrive.base.optional import optional
-from antdrive.runs.pool import ATTEMPTS, Done, Item, Result, Ticket, Waiting
+from antdrive.runs.pool import ATTEMPTS, Done, Item, Result, Ticket
 
-CHUNKS_EACH = 3  # chunks per worker, in progress or queued
+RUNS_EACH = 3  # runs per worker, in progress or queued
 PATIENCE = 10.0  # longest absence of the scheduler before the campaign ends [s]
 WORKERS_EVERY = 2.0  # period of the query for the number of workers [s]
 TICK = 0.005  # polling period of the tasks [s]
@@ -37,19 +38,25 @@ def run_on_cluster(
     """Run the work for each item on a cluster; yield the results in order of arrival."""
     distributed = optional("distributed", "cluster", "--dask spreads runs over machines")
     with _client(distributed, address) as client:
-        waiting, at_work, counted = Waiting(items, 1), dict[Any, list[Ticket[Item]]](), -math.inf
+        waiting = deque(Ticket(number, item) for number, item in enumerate(items))
+        at_work, workers, counted = dict[Any, Ticket[Item]](), 1, -math.inf
+
+        def submit(ticket: Ticket[Item]) -> None:
+            # dask searches arguments for results of other tasks, which is slow; it does not search a partial's arguments.
+            at_work[client.submit(functools.partial(_made, work, ticket.item, limit), pure=False)] = ticket
+
         suspects: list[Ticket[Item]] = []
         tried: Ticket[Item] | None = None
         since = math.inf  # start of the run that is retried alone
         while waiting or at_work or suspects:
             if time.monotonic() - counted > WORKERS_EVERY:
-                waiting.processes, counted = _workers(client, address), time.monotonic()
-            while waiting and len(at_work) < CHUNKS_EACH * waiting.processes:
-                _submit(client, work, waiting.chunk(), at_work, limit)
-            # Any run of a dead worker's chunk may have killed it, so each is retried alone.
+                workers, counted = _workers(client, address), time.monotonic()
+            while waiting and len(at_work) < RUNS_EACH * workers:
+                submit(waiting.popleft())
+            # Any run queued at a dead worker may have killed it, so each is retried alone.
             if not at_work:
                 tried, since = suspects.pop(), time.monotonic()
-                _submit(client, work, [tried], at_work, limit)
+                submit(tried)
             tick()
             ended = [future for future in at_work if future.done()]
             if not ended:
@@ -57,36 +64,18 @@ def run_on_cluster(
             if any(future.cancelled() for future in ended):
                 _require_scheduler(client, address)
             for future in ended:
-                chunk = at_work.pop(future)
-                if _killed(future) and chunk != [tried]:
-                    suspects += chunk
+                ticket = at_work.pop(future)
+                if _killed(future) and ticket is not tried:
+                    suspects.append(ticket)
                 else:
-                    yield from _received(
-                        future, chunk, waiting, limit is not None and time.monotonic() - since >= limit
-                    )
+                    slow = limit is not None and time.monotonic() - since >= limit
+                    yield from _received(future, ticket, waiting, slow)
 
 
-def _submit(
-    client: Any,
-    work: Callable[[Item], Result],
-    chunk: list[Ticket[Item]],
-    at_work: dict[Any, list[Ticket[Item]]],
-    limit: float | None,
-) -> None:
-    # dask searches arguments for results of other tasks, which is slow; it does not search a partial's arguments.
-    made = functools.partial(run_chunk, work, [ticket.item for ticket in chunk], limit)
-    at_work[client.submit(made, pure=False)] = chunk
-
-
-def run_chunk(
-    work: Callable[[Item], Result], items: Sequence[Item], limit: float | None = None
-) -> tuple[list[Result], float]:
-    """Execute runs in sequence; return their results and the time taken [s]."""
-    started, results = time.monotonic(), []
-    for item in items:
-        with _ended_after(limit):
-            results.append(work(item))
-    return results, time.monotonic() - started
+def _made(work: Callable[[Item], Result], item: Item, limit: float | None) -> Result:
+    """Return the result of a run within a limit."""
+    with _ended_after(limit):
+        return work(item)
 
 
 @contextmanager
@@ -104,25 +93,20 @@ def _ended_after(limit: float | None) -> Iterator[None]:
         timer.cancel()
 
 
-def _received(future: Any, chunk: list[Ticket[Item]], waiting: Waiting[Item], slow: bool) -> Iterator[Done[Item, Any]]:
-    """Yield the results of a chunk. A chunk that killed its workers while alone may have been too slow."""
+def _received(future: Any, ticket: Ticket[Item], waiting: deque[Ticket[Item]], slow: bool) -> Iterator[Done[Item, Any]]:
+    """Yield the result of a run. One that killed its workers while alone may have been too slow."""
     if future.status == "finished":
         try:
-            results, seconds = future.result()
-        except OSError:  # the connection was lost before the results came
-            waiting.put_back(chunk)
-            return
-        waiting.measured(seconds, len(chunk))
-        for ticket, result in zip(chunk, results, strict=True):
-            yield Done(ticket.item, ticket.number, result)
+            yield Done(ticket.item, ticket.number, future.result())
+        except OSError:  # the connection was lost before the result came
+            waiting.appendleft(ticket)
     elif _killed(future):
-        for ticket in chunk:
-            died = "its worker processes died"
-            yield Done(ticket.item, ticket.number, died=died, slow=slow, attempts=ATTEMPTS)
+        died = "its worker processes died"
+        yield Done(ticket.item, ticket.number, died=died, slow=slow, attempts=ATTEMPTS)
     elif future.status == "error":
         raise future.exception()
     else:  # cancelled: the connection was lost temporarily
-        waiting.put_back(chunk)
+        waiting.appendleft(ticket)
 
 
 def _killed(future: Any) -> bool:
@@ -130,7 +114,7 @@ def _killed(future: Any) -> bool:
     return future.status == "error" and type(future.exception()).__name__ == "KilledWorker"
 
 
-def check_address(address: str) -> None:
+def validate_address(address: str) -> None:
     """Raise `InputError` unless a text is an address of a cluster."""
     if not _LOCAL.fullmatch(address) and not re.match(r"(tcp|tls|ucx|ws|wss)://.", address):
         raise input_error(
@@ -141,7 +125,7 @@ def check_address(address: str) -> None:
 @contextmanager
 def _client(distributed: Any, address: str) -> Iterator[Any]:
     """Open a client of the cluster at an address."""
-    check_address(address)
+    validate_address(address)
     match = _LOCAL.fullmatch(address)
     with contextlib.ExitStack() as stack:
         target: Any = address

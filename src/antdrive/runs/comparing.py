@@ -238,10 +238,10 @@ def difference_cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 #: Makes one run of a comparison: returns the run, or its planner's error, and the folder with its files, if any.
-Attempt: TypeAlias = "Callable[[str, Scenario], tuple[Run | PlannerError, str | None]]"
+MakeRun: TypeAlias = "Callable[[str, Scenario], tuple[Run | PlannerError, str | None]]"
 
 
-def _attempt(label: str, scenario: Scenario) -> tuple[Run | PlannerError, str | None]:
+def _made(label: str, scenario: Scenario) -> tuple[Run | PlannerError, str | None]:
     """Drive without writing files."""
     from antdrive.planners import PlannerError
     from antdrive.sim.pipeline import run
@@ -310,14 +310,14 @@ def _name_of(planner: str | Planner) -> str:
 
 
 def compare_scenarios(
-    scenarios: Mapping[str, Sequence[Scenario]], seeds: Sequence[int], attempt: Attempt = _attempt
+    scenarios: Mapping[str, Sequence[Scenario]], seeds: Sequence[int], make: MakeRun = _made
 ) -> Comparison:
     """Run scenarios with every seed and return the table.
 
     Args:
         scenarios: each planner's scenarios, one per world, in the same order, by label
         seeds: the seeds; those of the scenarios do not count
-        attempt: makes one run
+        make: makes one run
 
     Raises:
         ValueError: two worlds have the same name.
@@ -331,7 +331,7 @@ def compare_scenarios(
         for seed in seeds:
             for label, scenario in ((label, several[place]) for label, several in scenarios.items()):
                 seeded = dataclasses.replace(scenario, seed=seed)
-                result, folder = attempt(label, seeded)
+                result, folder = make(label, seeded)
                 runs.append(Compared.of(label, seeded, result, folder))
                 if len(runs) <= len(scenarios) and not isinstance(result, Exception) and result.rollout is not None:
                     logs[label] = result.rollout

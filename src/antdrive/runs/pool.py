@@ -1,22 +1,21 @@
 """Pool of worker processes on this machine for many runs.
 
-If a worker dies, only its current run is lost, and that run is tried once more. A worker takes a chunk of runs and
-returns each result as soon as it is ready, so the current run is always known. Workers end when their parent does.
+A worker has one run at a time. If it dies, only that run is lost, and it is tried once more. Workers end when their parent
+does.
 `antdrive.runs.cluster` is the same pool on a dask cluster.
 """
 
 from __future__ import annotations
 
 import contextlib
-import math
 import multiprocessing
 import os
 import signal
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, NoReturn, TypeVar
 
@@ -30,9 +29,6 @@ ATTEMPTS = 2  # for a run that kills its process
 STILLBORN = 3  # after this many consecutive workers that die before they are ready, the pool gives up
 POLL_INTERVAL = 1.0  # longest wait for a result before other duties [s]
 GRACE = 1.0  # time for workers to end by themselves [s]
-CHUNK_SECONDS = 2.0  # target duration of a chunk [s]
-LONGEST_CHUNK = 256  # runs
-WEIGHT = 0.1  # of the latest run in the moving average of run times
 
 
 @dataclass(eq=False)
@@ -41,83 +37,7 @@ class Ticket(Generic[Item]):
 
     number: int
     item: Item
-    group: Hashable = None
     attempts: int = 0
-
-
-class Waiting(Generic[Item]):
-    """Queue of runs, by group.
-
-    A process stays with the group of its last run, then takes an untouched group, then helps with the largest. Chunks
-    are sized for about two seconds, from the mean time of recent runs, and are shorter near the end.
-
-    Attributes:
-        processes: number of processes
-    """
-
-    def __init__(
-        self, items: Iterable[Item], processes: int, group: Callable[[Item], Hashable] = lambda item: None
-    ) -> None:
-        self.processes = processes
-        self._first: deque[Ticket[Item]] = deque()
-        self._groups: dict[Hashable, deque[Ticket[Item]]] = {}
-        self._length = 0
-        for number, item in enumerate(items):
-            ticket = Ticket(number, item, group(item))
-            self._groups.setdefault(ticket.group, deque()).append(ticket)
-            self._length += 1
-        self._fresh = deque(self._groups)
-        self._mean: float | None = None
-
-    def __len__(self) -> int:
-        return self._length
-
-    def measured(self, seconds: float, runs: int = 1) -> None:
-        """Record how long runs took."""
-        weight = 1 - (1 - WEIGHT) ** runs
-        each = seconds / runs
-        self._mean = each if self._mean is None else (1 - weight) * self._mean + weight * each
-
-    def put_back(self, tickets: Iterable[Ticket[Item]]) -> None:
-        """Return runs to the front of the queue."""
-        returned = list(tickets)
-        self._first.extend(returned)
-        self._length += len(returned)
-
-    def chunk(self, group: Hashable = None) -> list[Ticket[Item]]:
-        """Take the next runs for a process; empty if none is left."""
-        tickets: list[Ticket[Item]] = []
-        most = self._chunk_length()
-        while self._length and len(tickets) < most:
-            if self._first:
-                # Returned runs go one by one, so that a dying process identifies its run.
-                tickets, most = [self._first.popleft()], 1
-                self._length -= 1
-            else:
-                group = self._next_group(tickets[-1].group if tickets else group)
-                runs = self._groups[group]
-                taken = [runs.popleft() for _ in range(min(most - len(tickets), len(runs)))]
-                tickets += taken
-                self._length -= len(taken)
-                if not runs:
-                    del self._groups[group]
-        return tickets
-
-    def _chunk_length(self) -> int:
-        if self._mean is None:
-            return 1
-        by_time = CHUNK_SECONDS / max(self._mean, 1e-6)
-        share = math.ceil(self._length / (2 * self.processes))
-        return max(1, min(int(by_time), LONGEST_CHUNK, share))
-
-    def _next_group(self, last: Hashable) -> Hashable:
-        if last in self._groups:
-            return last
-        while self._fresh:
-            group = self._fresh.popleft()
-            if group in self._groups:
-                return group
-        return max(self._groups, key=lambda group: len(self._groups[group]))
 
 
 class WorkerDied(RuntimeError):
@@ -167,8 +87,7 @@ class _Worker:
     pipe: Connection
     work: Callable[[Any], Any]
     ready: bool = False
-    handed: deque[Ticket[Any]] = field(default_factory=deque)  # the first is the current run
-    group: Hashable = None
+    ticket: Ticket[Any] | None = None  # the current run
     since: float = 0.0  # start of the current run
     slow: bool = False  # whether it was killed because that run exceeded the limit
     fault: str = ""  # what user code did to the process
@@ -214,22 +133,16 @@ class Pool:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def each(
-        self,
-        work: Callable[[Item], Result],
-        items: Iterable[Item],
-        *,
-        group: Callable[[Item], Hashable] = lambda item: None,
-    ) -> Generator[Done[Item, Result], None, None]:
-        """Run the work for each item; yield results in order of arrival. Workers keep to a group of items while they can."""
+    def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Generator[Done[Item, Result], None, None]:
+        """Run the work for each item; yield results in order of arrival."""
         if not self._processes:
             for number, item in enumerate(items):
                 yield Done(item, number, work(item))
             return
-        waiting = Waiting(items, self._processes, group)
+        waiting = deque(Ticket(number, item) for number, item in enumerate(items))
         stillborn = 0
         try:
-            while waiting or any(worker.handed for worker in self._workers):
+            while waiting or any(worker.ticket for worker in self._workers):
                 self._staff(work, waiting)
                 ended = wait([worker.pipe for worker in self._workers], self._patience())
                 if not ended:
@@ -253,11 +166,11 @@ class Pool:
                         continue
                     if isinstance(answer, _Raised):
                         raise answer.error
-                    if worker.ready:
-                        yield _take_result(worker, answer, waiting)
+                    if worker.ticket is not None:
+                        yield _take_result(worker, worker.ticket, answer)
                     worker.ready, stillborn = True, 0
         finally:
-            if any(worker.handed or not worker.ready for worker in self._workers):
+            if any(worker.ticket or not worker.ready for worker in self._workers):
                 self.close()
 
     def in_order(
@@ -294,12 +207,12 @@ class Pool:
                     system.kill(process.pid)  # loky's processes have no `kill`
                 process.join()
 
-    def _staff(self, work: Callable[[Any], Any], waiting: Waiting[Any]) -> None:
-        """Hand chunks to idle workers and start missing ones."""
+    def _staff(self, work: Callable[[Any], Any], waiting: deque[Ticket[Any]]) -> None:
+        """Hand runs to idle workers and start missing ones."""
         for worker in self._workers:
-            if worker.ready and not worker.handed:
-                _hand(worker, work, waiting)
-        idle = sum(not worker.handed for worker in self._workers)
+            if worker.ready and worker.ticket is None and waiting:
+                _hand(worker, work, waiting.popleft())
+        idle = sum(worker.ticket is None for worker in self._workers)
         for _ in range(min(len(waiting) - idle, self._processes - len(self._workers))):
             self._workers.append(_start(work))
 
@@ -308,34 +221,33 @@ class Pool:
         if self._limit is None:
             return POLL_INTERVAL
         now = time.monotonic()
-        left = [one.since + self._limit - now for one in self._workers if one.ready and one.handed and not one.slow]
+        left = [one.since + self._limit - now for one in self._workers if one.ticket and not one.slow]
         return max(0.0, min([POLL_INTERVAL, *left]))
 
     def _end_slow(self) -> None:
         """Kill workers whose run exceeds the limit; their closed pipe reports it."""
         for worker in self._workers:
-            at_work = worker.ready and worker.handed and not worker.pipe.poll()
+            at_work = worker.ticket and not worker.pipe.poll()
             if self._limit is not None and at_work and time.monotonic() - worker.since > self._limit:
                 worker.slow = True
                 with contextlib.suppress(OSError):
                     system.kill(worker.process.pid)
 
-    def _reap(self, worker: _Worker, waiting: Waiting[Any]) -> Iterator[Done[Any, Any]]:
-        """Return a dead worker's runs to the queue; yield its current run if that was the last attempt."""
+    def _reap(self, worker: _Worker, waiting: deque[Ticket[Any]]) -> Iterator[Done[Any, Any]]:
+        """Return a dead worker's run to the queue, or yield it if that was the last attempt."""
         self._workers.remove(worker)
         worker.pipe.close()
         worker.process.join()
-        if not worker.handed:
+        ticket = worker.ticket
+        if ticket is None:
             return
-        ticket = worker.handed.popleft()
         ticket.attempts += 1
         if worker.slow or worker.fault or ticket.attempts == ATTEMPTS:
             died = worker.fault or f"its process ended {_how(worker.process.exitcode)}"
             tries, fault = ticket.attempts, bool(worker.fault)
             yield Done(ticket.item, ticket.number, died=died, slow=worker.slow, fault=fault, attempts=tries)
         else:
-            worker.handed.appendleft(ticket)
-        waiting.put_back(worker.handed)
+            waiting.appendleft(ticket)
 
 
 def call_now(call: Callable[[], Result]) -> Result:
@@ -350,23 +262,18 @@ def in_new_process(call: Callable[[], Result]) -> Result | None:
     return None
 
 
-def _take_result(worker: _Worker, result: Any, waiting: Waiting[Any]) -> Done[Any, Any]:
-    """Return the result of a worker's current run and advance to its next."""
-    ticket, now = worker.handed.popleft(), time.monotonic()
-    waiting.measured(now - worker.since)
-    worker.group, worker.since, worker.slow = ticket.group, now, False
+def _take_result(worker: _Worker, ticket: Ticket[Any], result: Any) -> Done[Any, Any]:
+    """Return the result of a worker's run; the worker is idle."""
+    worker.ticket, worker.slow = None, False
     return Done(ticket.item, ticket.number, result, attempts=ticket.attempts + 1)
 
 
-def _hand(worker: _Worker, work: Callable[[Any], Any], waiting: Waiting[Any]) -> None:
-    """Hand the next chunk to an idle worker."""
-    chunk = waiting.chunk(worker.group)
-    if chunk:
-        changed = None if worker.work is work else work
-        worker.work, worker.since = work, time.monotonic()
-        worker.handed.extend(chunk)
-        with contextlib.suppress(OSError):  # dead; its pipe will show it
-            worker.pipe.send_bytes(_packed((changed, [ticket.item for ticket in chunk])))
+def _hand(worker: _Worker, work: Callable[[Any], Any], ticket: Ticket[Any]) -> None:
+    """Hand a run to an idle worker."""
+    changed = None if worker.work is work else work
+    worker.work, worker.since, worker.ticket = work, time.monotonic(), ticket
+    with contextlib.suppress(OSError):  # dead; its pipe will show it
+        worker.pipe.send_bytes(_packed((changed, ticket.item)))
 
 
 def _how(code: int) -> str:
@@ -410,13 +317,9 @@ def serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
     with contextlib.suppress(EOFError, OSError):  # the parent closed the pipe, or died
         pipe.send(None)
         while True:
-            changed, items = pipe.recv()
+            changed, item = pipe.recv()
             work = changed or work
-            for item in items:
-                if pipe.poll():  # a busy worker receives nothing, so the pipe is closed
-                    supervision.finish()
-                    return
-                pipe.send_bytes(_answer(work, item))
+            pipe.send_bytes(_answer(work, item))
     supervision.finish()
 
 

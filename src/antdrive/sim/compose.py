@@ -58,13 +58,13 @@ class Parts(NamedTuple):
 def compose(s: Scenario) -> Parts:
     """Select the parts of a scenario's drive."""
     perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
-    tracks_movers, mapped = perception.kind == "lidar", s.map == "given"
+    tracks_movers, mapless = perception.kind == "lidar", s.mapless
     moving = s.moving
     levels = s.localisation, s.robot, s.noise, s.odometry, 1 / hz
-    senses, localiser = positioning(*levels, s.task.start, s.seed, mapless=not mapped)
-    lidar = None if mapped and not tracks_movers else _simulated_lidar(s)
-    survey = _survey(s, lidar, tracks_movers, matching=localiser.matched) if lidar and not mapped else None
-    scans = _mover_detector(s) if mapped and tracks_movers else survey
+    senses, localiser = positioning(*levels, s.task.start, s.seed, mapless=mapless)
+    lidar = _simulated_lidar(s) if mapless or tracks_movers else None
+    survey = _survey(s, lidar, tracks_movers, matching=localiser.matched) if lidar and mapless else None
+    scans = _mover_detector(s) if not mapless and tracks_movers else survey
     tracking = scans.tracking if scans else None
     given = _given(s)
     movers: PerceivedMovers = Tracked(tracking, perception, hz) if tracking else given
@@ -80,7 +80,7 @@ def compose(s: Scenario) -> Parts:
     if s.timed:
         rules.append(KeepToSchedule(guide, s.robot, hz))
     if moving and avoidance is not None:
-        if mapped and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
+        if not mapless and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
             rules.append(SlowAtCorners(tracking, s.robot, hz, reaction))
         drifts = survey is not None and tracks_movers
         share = DRIFTING_SHARE if drifts else GOAL_SHARE
@@ -120,7 +120,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
     return RoutePlanner(
         planner=s.planner,
         planner_label=s.planner_label,
-        task=s.task if s.map == "given" else mapless_task(s.task),
+        task=mapless_task(s.task) if s.mapless else s.task,
         robot=s.robot,
         controller=s.controller,
         margin=s.planned_margin,
@@ -133,7 +133,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
         seed=s.seed,
         noise=s.noise,
         motions=s.trajectories.motions if s.timed else (),
-        mapped=s.map == "given",
+        mapless=s.mapless,
         whole=not s.cell_by_cell,
     )
 
@@ -188,7 +188,7 @@ def _mover_detector(s: Scenario) -> MoverDetector:
     """Create the detection of movers and unknown obstacles for a robot with a map."""
     noise, lidar = s.robot.noise.scaled(s.noise), _lidar(s)
     errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
-    ground = KnownGround(lidar, s.task.world, math.inf, *errors)
+    ground = KnownGround(lidar, s.task.world, *errors)
     return MoverDetector(ground, MoverTracking(lidar, s.control_hz, *errors))
 
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Map, localisation and odometry of a log whose record leaves them out, as at their defaults.
 SENSED: Mapping[str, Any] = {name: SETTINGS[name].default for name in ("map", "localisation", "odometry")}
+#: The defaults of settings without a key of their own in the record.
+OTHERS: Mapping[str, Any] = {name: one.default for name, one in SETTINGS.items() if not DriveRecord.held(name)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +90,8 @@ def _changes(log: LoggedRun) -> dict[str, Any]:
         "controller": log.record.controller.settings,
         **(SENSED if log.record.sensing is None else settings_of(log.record.sensing)),
         "unseen": [[disc.x, disc.y, disc.radius] for disc in log.record.unseen],
+        **OTHERS,
+        **(log.record.settings or {}),
     }
 
 

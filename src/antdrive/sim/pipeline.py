@@ -25,9 +25,8 @@ from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import rollout_of
 from antdrive.sim.scenario import Scenario, picture_of, usual_time_limit
 from antdrive.worlds import Grid
-from antdrive.worlds.svg import LINE, card
+from antdrive.worlds.svg import card
 
-ROUTE_COLOUR = "#182242"  # of routes in notebooks
 ENDED_BY = {
     PlanStatus.NO_PATH: Outcome.NO_PATH,
     PlanStatus.STOPPED: Outcome.STOPPED,
@@ -118,17 +117,11 @@ class Run:
         return f"<Run of {s.planner_label} in {s.task.world.name}: {self.outcome.value}{reason}{drive}{proof}>"
 
     def _repr_html_(self) -> str:
-        s = self.scenario
-        facts: dict[str, object] = {"planner": s.planner_label, "robot": s.robot.name}
-        lines = []
+        s, more = self.scenario, {"reason": self.reason} if self.reason else {}
         if self.rollout is not None:
-            lines = [(self.rollout.route, ROUTE_COLOUR, True), (self.rollout.pose[::12, :2], LINE, False)]
-            facts["time"] = f"{self.rollout.t[-1]:.1f} s"
-            facts["minimum clearance"] = f"{self.rollout.clearance.min():.3f} m"
-            facts["certified"] = "yes" if self.certified else "no"
-        if self.reason:
-            facts["reason"] = self.reason
-        return card(picture_of(s, lines), f"{s.task.world.name}: {self.outcome.value}", facts)
+            return self.rollout.card(certified="yes" if self.certified else "no", **more)
+        facts = {"planner": s.planner_label, "robot": s.robot.name, **more}
+        return card(picture_of(s), f"{s.task.world.name}: {self.outcome.value}", facts)
 
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:

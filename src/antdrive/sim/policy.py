@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 import dataclasses
+import enum
 import math
 from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
 from antdrive.base.errors import FieldError
 
-# Replan triggers, as the log records them.
-STRAYED = "strayed"
-LATE = "late"
-WAITED = "waited"
-OBSTRUCTED = "obstructed"
-TRAFFIC = "traffic"
-MISSED = "missed the goal"
-# Without a map.
-DISCOVERED = "discovered"
-STALLED = "stalled"
-HELD = "held by sight"
-BACKED = "backed off"
-MADE_ROOM = "made room"
-LOST = "no way"
-SCANNED = "looked round"
-
 PerceptionKind: TypeAlias = Literal["positions", "velocities", "motions", "lidar"]
+
+
+class Trigger(str, enum.Enum):
+    """Trigger of a replan. The value is the log's word for it."""
+
+    STRAYED = "strayed"
+    LATE = "late"
+    WAITED = "waited"
+    OBSTRUCTED = "obstructed"
+    TRAFFIC = "traffic"
+    MISSED = "missed the goal"
+    DECISION = "decision"  # of planners that decide cell by cell
+    # Without a map.
+    DISCOVERED = "discovered"
+    STALLED = "stalled"
+    CONSTRAINED = "held by sight"  # the stopping constraint keeps the robot from moving
+    BACKED_OFF = "backed off"
+    MADE_ROOM = "made room"
+    LOST = "no way"
+    SCAN_TURN = "looked round"
+
+    __str__ = str.__str__
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -60,7 +60,7 @@ def no_path_reason(s: RoutePlanner, grid: Grid, said: str, finds_path: FindsPath
         works = not s.motions and finds_path(same.routes)  # astar ignores motions
         finds = f"; {same.options} finds one on these cells" if works else ""
         return f"{s.planner_label} found {head}{f': {said}' if said else ''}{finds}"
-    if s.turns and not grid.turns:
+    if s.tries_footprint and not grid.turns:
         fine = f" on cells of {s.outlined_cell:g} m" if s.outlined_cell < grid.cell else ""
         head += f", nor for {_shape(robot)}{fine}"
     reach = end_reach(s.inflate, grid.cell), within_goal(s.task)
@@ -93,14 +93,14 @@ def _needs(s: RoutePlanner, passage: Passage) -> str:
     robot, foot = s.robot, s.robot.footprint
     if foot.is_disc:
         return "" if passage.radius > robot.radius + ROUNDING else "this robot does not fit through"
-    plans = "" if s.turns else f"plans use the disc of {robot.name}"
+    plans = "" if s.tries_footprint else f"plans use the disc of {robot.name}"
     if not passage.between:
         return plans
     _, ymin, _, ymax = foot.bounds
     width, gap = ymax - ymin + 2 * s.margin, 2 * passage.radius
     fits = f"of the {gap:.3g} m straight ahead" if width <= gap else f"straight ahead, more than the {gap:.3g} m there"
     needs = f"{_shape(robot)} needs {width:.3g} m {fits}"
-    if s.turns and width <= gap:
+    if s.tries_footprint and width <= gap:
         needs += "; on these cells, by straight moves and turns on the spot, it does not get through"
     return f"{plans}{'; ' * bool(plans)}{needs}"
 
@@ -114,14 +114,14 @@ def _remedies(s: RoutePlanner, grid: Grid, query: Query, passage: Passage | None
     if same is None:
         return
     shapes = [same]
-    if fits or s.turns:
+    if fits or s.tries_footprint:
         yield from _on_finer_cells(same)
-    if not (s.turns or s.robot.footprint.is_disc):
-        shapes.append((same if s.can_turn else _astar(s)).and_("--footprint exact", footprint="exact"))
+    if not (s.tries_footprint or s.robot.footprint.is_disc):
+        shapes.append((same if s.plans_footprints else _astar(s)).and_("--footprint exact", footprint="exact"))
         yield from _on_finer_cells(shapes[-1])
     widest = math.inf if fits else passage.radius if passage else 0.0
     for shape in shapes:
-        least = s.robot.footprint.inner_radius if shape.routes.turns else s.robot.radius
+        least = s.robot.footprint.inner_radius if shape.routes.tries_footprint else s.robot.radius
         margins = [m for m in MARGINS if m < s.margin - ROUNDING and least + m < widest - ROUNDING]
         halves = [m for m in margins if m <= margins[0] / 2]
         for margin in dict.fromkeys((*margins[:1], *halves[:1], *margins[-1:])):
@@ -136,7 +136,7 @@ def _on_finer_cells(remedy: Remedy) -> Iterator[Remedy]:
         yield remedy
     for cell in CELLS:
         # Plans for the footprint alone use no larger cells anyway.
-        if cell < (s.outlined_cell if s.turns and s.footprint == "exact" else s.cell) - ROUNDING:
+        if cell < (s.outlined_cell if s.tries_footprint and s.footprint == "exact" else s.cell) - ROUNDING:
             yield remedy.and_(f"--cell {cell:g}", cell=cell)
 
 
@@ -182,7 +182,7 @@ def _first_that_works(remedies: Iterator[Remedy], finds_path: FindsPath) -> Reme
 def _cells(s: RoutePlanner) -> list[float]:
     """Return the cells of each grid of a plan, by what one of them costs."""
     area = math.prod(s.task.world.size)
-    outlined = [OUTLINED * area / s.outlined_cell**2] * len(s.outline_margins) if s.turns else []
+    outlined = [OUTLINED * area / s.outlined_cell**2] * len(s.outline_margins) if s.tries_footprint else []
     return [(TIMED if s.motions else 1) * area / s.cell**2, *outlined]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import FieldError, InputError
@@ -41,35 +41,28 @@ def written_of(record: DriveRecord) -> Written:
 def command_of(record: DriveRecord) -> str | None:
     """Return the `antdrive run` command of a log's scenario; None if a setting has no option, or a word is false."""
     try:
-        false = [*false_words(record), *false_settings(record)]
-        return None if false else written_of(record).command()
+        return None if any(false_words(record, settings=True)) else written_of(record).command()
     except (FieldError, InputError):
         return None
 
 
-def false_words(record: DriveRecord) -> Iterator[str]:
-    """Yield a sentence for every name, place and seed in a log's written scenario that its record contradicts.
+def false_words(record: DriveRecord, *, settings: bool = False) -> Iterator[str]:
+    """Yield a sentence for every word in a log's written scenario that its record contradicts.
 
     Neither files nor a user's code are read: what they hold is unknown.
+
+    Args:
+        record: the record of a log
+        settings: whether to compare settings and options too, whose defaults load the compiler; else names, places and seed
     """
-    return _sentences(record, _contradicted_names)
-
-
-def false_settings(record: DriveRecord) -> Iterator[str]:
-    """Yield a sentence for every setting and option in a log's written scenario that its record contradicts.
-
-    Their defaults are those of planners and controllers, which load the compiler.
-    """
-    return _sentences(record, _contradicted_settings)
-
-
-def _sentences(record: DriveRecord, contradicted: Callable[[DriveRecord, Written], Iterator[str]]) -> Iterator[str]:
     if record.written is not None:
         try:
-            for key in contradicted(record, written_of(record)):
-                yield f"record.written.{key}: contradicts the rest of the record"
+            words = written_of(record)
+            keys = [*_contradicted_names(record, words), *(_contradicted_settings(record, words) if settings else ())]
         except (FieldError, InputError) as error:
             yield str(FieldError(error.key, error.problem).under("record.written"))
+            return
+        yield from (f"record.written.{key}: contradicts the rest of the record" for key in keys)
 
 
 def _contradicted_names(record: DriveRecord, words: Written) -> Iterator[str]:
@@ -102,7 +95,7 @@ def _contradicted_settings(record: DriveRecord, words: Written) -> Iterator[str]
     unknown = {"seed"} | {key for key in ("margin", "cell", "time_limit", "sees") if key not in given}  # resolved
     if record.perception is None or record.perception.kind == "motions":
         unknown |= {"sees", "avoid"}
-    if record.perception is None and (record.sensing is None or record.sensing.map == "given"):
+    if record.perception is None and not record.mapless:
         unknown.add("replan")
     keys = (one.key for one in SETTINGS.values())
     yield from (key for key in keys if key not in unknown and given.get(key) != in_force.get(key))

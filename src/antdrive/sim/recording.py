@@ -12,6 +12,7 @@ from antdrive.planners import AStar, PlanResult, Query, Tangent
 from antdrive.sim.compose import avoidance_of, perception_of
 from antdrive.sim.driving.plants import Drive
 from antdrive.sim.driving.route_planner import by_contents, grid_of, outlined_grid_of
+from antdrive.sim.log.contacts import attributed
 from antdrive.sim.log.record import (
     ComponentRecord,
     DriveRecord,
@@ -60,13 +61,13 @@ def rollout_of(
     arrays: dict[str, Any] = {**driven, "route": route.xy, "cells": answer.cells}
     for part in parts.logs:
         arrays |= part.logged(log, s.physics_hz // s.control_hz)
-    return Rollout(**arrays, record=record)
+    return attributed(Rollout(**arrays, record=record))
 
 
 def configuration_of(s: Scenario, grid: Grid, answer: PlanResult) -> dict[str, Any]:
     """Return the fields of a scenario's record that a drive does not change, except its time limit and smoothing."""
     perception, avoidance = (perception_of(s), avoidance_of(s)) if s.moving else (None, None)
-    replanning = s.replanning if s.moving or s.map == "none" else None
+    replanning = s.replanning if s.moving or s.mapless else None
     return {
         "task": s.task,
         "unseen": s.unseen,

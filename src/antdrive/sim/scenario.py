@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import inspect
 import json
 import os
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from antdrive.base import Floats
 from antdrive.base.checks import suggest
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_position
@@ -124,25 +122,25 @@ class Scenario(Settings):
 
     def _check_sensing(self) -> None:
         """Raise FieldError for invalid combinations of map, localisation, perception, planner and robot."""
-        if self.map == "none" and self.replanning is None:
+        if self.mapless and self.replanning is None:
             raise FieldError(
                 "replan", "none: a mapless robot finds its way by replanning; false replans around no movers"
             )
-        if self.map == "none" and self.robot.lidar is None:
+        if self.mapless and self.robot.lidar is None:
             raise FieldError("map", f"none: {self.robot.name} {NO_LIDAR}")
         kind = self.known_perception.kind
         if kind == "lidar" and self.robot.lidar is None:
             raise FieldError("sees", f"lidar: {self.robot.name} {NO_LIDAR}")
-        if kind == "lidar" and self.map == "given" and self.localisation == "odometry":
+        if kind == "lidar" and not self.mapless and self.localisation == "odometry":
             raise FieldError("sees", "lidar: with a given map the pose must not drift; localise by fixes or true")
-        drifts = self.map == "none" and self.drifting
+        drifts = self.mapless and self.drifting
         if drifts and self.task.world.movers and kind != "lidar":
             raise FieldError(
                 "sees",
                 f"{kind}: the pose drifts with localisation {self.localisation}, which displaces ground-truth movers in "
                 "the robot's frame; write lidar, or localise by fixes or true",
             )
-        if self.map == "given" and self.localisation == "matching":
+        if not self.mapless and self.localisation == "matching":
             raise FieldError("localisation", "matching: needs map none, since scans are matched to the occupancy map")
         can = capabilities_of(self.planner)
         if self.footprint == "exact" and not self.plans_footprints and not self.robot.footprint.is_disc:
@@ -152,7 +150,7 @@ class Scenario(Settings):
                 f"exact: {self.planner_label} plans for the disc around the robot{among}; `antdrive planners` lists those that "
                 "plan for its footprint",
             )
-        if self.map == "none" and can.needs_motions:
+        if self.mapless and can.needs_motions:
             raise FieldError(
                 "map", f"none: {self.planner_label} needs ground-truth motions of movers, which a mapless robot lacks"
             )
@@ -243,8 +241,8 @@ class Scenario(Settings):
     def as_dict(self) -> dict[str, Any]:
         """Return the settings as plain values, for JSON; `docs/reference/rollout-format.md` lists the keys.
 
-        `settings` holds the non-default values of controller, perception, avoidance and replanning, null where there is none,
-        and the unseen obstacles.
+        `settings` holds the unseen obstacles and the non-default values of all settings without a key of their own, null where
+        there is none.
         """
         task, planner = self.task, self.planner
         changed: dict[str, Any] = {}
@@ -256,6 +254,7 @@ class Scenario(Settings):
             changed |= settings_of(self.sensing)
         if self.unseen:
             changed["unseen"] = [[disc.x, disc.y, disc.radius] for disc in self.unseen]
+        changed |= self.other_settings or {}
         return {
             "world": task.world.name,
             "planner": self.planner_label,
@@ -323,7 +322,7 @@ class Scenario(Settings):
         """Side of the planning cells [m]; fine without a map, since coarse cells close gaps."""
         if self.cell is not None:
             return self.cell
-        return min(self.task.cell, FINE) if self.map == "none" else self.task.cell
+        return min(self.task.cell, FINE) if self.mapless else self.task.cell
 
     @property
     def sensing(self) -> SensingRecord | None:
@@ -348,7 +347,7 @@ class Scenario(Settings):
     @property
     def cell_by_cell(self) -> bool:
         """Whether the planner decides cell by cell, among movers on a map."""
-        around = self.map == "given" and self.moving and self.replanning is not None and self.replanning.around_movers
+        around = not self.mapless and self.moving and self.replanning is not None and self.replanning.around_movers
         return around and capabilities_of(self.planner).cell_by_cell
 
     @property
@@ -377,9 +376,14 @@ class Scenario(Settings):
         return bool(self.driven_world.movers) or self.known_perception.kind == "lidar"
 
     @property
+    def mapless(self) -> bool:
+        """Whether the robot has no map."""
+        return self.map == "none"
+
+    @property
     def scans(self) -> bool:
         """Whether the drive uses the robot's lidar."""
-        return self.map == "none" or (self.known_perception.kind == "lidar" and not self.timed)
+        return self.mapless or (self.known_perception.kind == "lidar" and not self.timed)
 
     @property
     def noisy(self) -> bool:
@@ -442,25 +446,13 @@ def usual_time_limit(length: float, robot: RobotSpec, noise: float) -> float:
     return 30.0 + 10.0 * length / steady(robot, heading_error(robot, noise)).max_speed
 
 
-def picture_of(s: Scenario, lines: Iterable[tuple[Floats, str, bool]] = ()) -> str:
-    """Draw the driven world as SVG, with start, goal, paths of movers, and lines: points, colour, whether dashed."""
+def picture_of(s: Scenario) -> str:
+    """Draw the driven world as SVG, with start, goal and paths of movers."""
     world, task = s.driven_world, s.task
     goal, movers = (*task.goal, task.goal_tolerance), world.mover_paths(task.start[:2], s.seed)
-    return world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
+    return world_svg(world.bounds, world.discs, start=task.start, goal=goal, movers=movers)
 
 
 def key_of(identity: str, seed: int) -> str:
     """Return the hash of a scenario's identity and seed: a SHA-256, cut to 32 hexadecimal digits."""
     return hashlib.sha256(f"{identity}\n{seed}".encode()).hexdigest()[:KEY_DIGITS]
-
-
-def _short(signature: inspect.Signature) -> inspect.Signature:
-    """Return a signature without the annotations' metadata, to keep `help()` readable."""
-    parameters = [
-        one.replace(annotation=get_args(one.annotation)[0]) if get_origin(one.annotation) is Annotated else one
-        for one in signature.parameters.values()
-    ]
-    return signature.replace(parameters=parameters)
-
-
-Scenario.__signature__ = _short(inspect.signature(Scenario))  # type: ignore[attr-defined]

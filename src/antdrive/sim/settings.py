@@ -12,12 +12,12 @@ import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from annotated_types import Ge, Gt, Le
 
 from antdrive.base.errors import FieldError
-from antdrive.sim import effects
+from antdrive.sim import idle_settings
 from antdrive.sim.policy import Perception, ReplanPolicy
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Setting:
     usual: str = ""  # meaning of the default None, for `--help`
     # version of the campaign-key format that added the setting; settings added after version 1 are omitted at their default
     since: int = 1
-    idle: effects.Idle = effects.never  # why it cannot act in a scenario
+    idle: idle_settings.Idle = idle_settings.never  # why it cannot act in a scenario
 
 
 def _pursuit() -> "PurePursuit":
@@ -68,179 +68,167 @@ def _avoidance() -> "Avoidance":
     return Avoidance()
 
 
+def setting(default: Any, help: str, group: str, metavar: str = "", *bounds: Ge | Gt | Le, **notation: Any) -> Any:
+    """Declare a setting as a field: its default, or a function that returns it; its notation; and the bounds of a number."""
+    made = {"default_factory": default} if callable(default) else {"default": default}
+    return field(**made, metadata={"setting": Setting(help, group, metavar, **notation), "bounds": bounds})
+
+
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """Scenario fields other than task, planner and robot."""
 
-    smoothing: Annotated[
-        str,
-        Setting(
-            "how the planned cells become a route: none (drive the cells), taut (shortest) or clearance (short, "
-            "and away from obstacles where there is room)",
-            "Planner",
-            "KIND",
-            choices=SMOOTHINGS,
-            axis=True,
-            idle=effects.if_timed,
-        ),
-    ] = "clearance"
-    noise: Annotated[
-        float,
+    smoothing: str = setting(
+        "clearance",
+        "how the planned cells become a route: none (drive the cells), taut (shortest) or clearance (short, "
+        "and away from obstacles where there is room)",
+        "Planner",
+        "KIND",
+        choices=SMOOTHINGS,
+        axis=True,
+        idle=idle_settings.if_timed,
+    )
+    noise: float = setting(
+        0.0,
+        "factor on the robot's documented noise; 0 is a perfect robot",
+        "Robot",
+        "FACTOR",
         Ge(0),
-        Setting(
-            "factor on the robot's documented noise; 0 is a perfect robot",
-            "Robot",
-            "FACTOR",
-            axis=True,
-            idle=effects.without_noise,
-        ),
-    ] = 0.0
-    margin: Annotated[
-        float | None,
+        axis=True,
+        idle=idle_settings.without_noise,
+    )
+    margin: float | None = setting(
+        None,
+        "clearance of plans on top of the robot's radius [m], or auto: the smallest margin predicted to suffice for robot, "
+        "noise and smoothing, calibrated once with 80 short drives per candidate margin",
+        "Planner",
+        "METRES|auto",
         Ge(0),
-        Setting(
-            "clearance of plans on top of the robot's radius [m], or auto: the smallest margin predicted to suffice for robot, "
-            "noise and smoothing, calibrated once with 80 short drives per candidate margin",
-            "Planner",
-            "METRES|auto",
-            form="margin",
-            axis=True,
-            column="margin_asked",
-            usual="at least 0.03, by robot, noise and smoothing",
-        ),
-    ] = None
-    cell: Annotated[
-        float | None,
+        form="margin",
+        axis=True,
+        column="margin_asked",
+        usual="at least 0.03, by robot, noise and smoothing",
+    )
+    cell: float | None = setting(
+        None,
+        "side of a grid cell [m]",
+        "Planner",
+        "METRES",
         Gt(0),
-        Setting(
-            "side of a grid cell [m]",
-            "Planner",
-            "METRES",
-            usual="the world's own; at most 0.05 without a map, and for footprints unless ants find a way on larger ones",
-        ),
-    ] = None
-    footprint: Annotated[
-        str,
-        Setting(
-            "the shape that plans keep clear: disc (the circle around the robot), exact (its footprint, which turns on the "
-            "spot and drives straight), or auto (the disc unless it has no way or one over 10 % longer; ants compare ways on the "
-            "world's cells)",
-            "Planner",
-            "auto|disc|exact",
-            choices=FOOTPRINTS,
-            since=2,
-            idle=effects.with_one_shape,
-        ),
-    ] = "auto"
-    map: Annotated[
-        str,
-        Setting(
-            "the robot's map before the drive: given (the whole world), or none (only what its lidar detects)",
-            "Sensing",
-            "given|none",
-            choices=MAPS,
-            since=2,
-        ),
-    ] = "given"
-    localisation: Annotated[
-        str,
-        Setting(
-            "the robot's pose estimate: fixes (with the robot's noise; with map none fused with matching), odometry (wheels "
-            "and gyro, which drift), matching (odometry corrected by scan matching; needs map none) or true (without error)",
-            "Sensing",
-            "KIND",
-            choices=LOCALISATIONS,
-            since=2,
-            idle=effects.with_exact_fixes,
-        ),
-    ] = "fixes"
-    odometry: Annotated[
-        float,
+        usual="the world's own; at most 0.05 without a map, and for footprints unless ants find a way on larger ones",
+    )
+    footprint: str = setting(
+        "auto",
+        "the shape that plans keep clear: disc (the circle around the robot), exact (its footprint, which turns on the "
+        "spot and drives straight), or auto (the disc unless it has no way or one over 10 % longer; ants compare ways on the "
+        "world's cells)",
+        "Planner",
+        "auto|disc|exact",
+        choices=FOOTPRINTS,
+        since=2,
+        idle=idle_settings.with_one_shape,
+    )
+    map: str = setting(
+        "given",
+        "the robot's map before the drive: given (the whole world), or none (only what its lidar detects)",
+        "Sensing",
+        "given|none",
+        choices=MAPS,
+        since=2,
+    )
+    localisation: str = setting(
+        "fixes",
+        "the robot's pose estimate: fixes (with the robot's noise; with map none fused with matching), odometry (wheels "
+        "and gyro, which drift), matching (odometry corrected by scan matching; needs map none) or true (without error)",
+        "Sensing",
+        "KIND",
+        choices=LOCALISATIONS,
+        since=2,
+        idle=idle_settings.with_exact_fixes,
+    )
+    odometry: float = setting(
+        1.0,
+        "factor on the documented errors of odometry",
+        "Sensing",
+        "FACTOR",
         Ge(0),
-        Setting(
-            "factor on the documented errors of odometry", "Sensing", "FACTOR", since=2, idle=effects.without_odometry
-        ),
-    ] = 1.0
-    controller: Annotated[
-        "PurePursuit",
-        Setting(
-            "settings of the controller, such as {lookahead_time: 0.5}",
-            "Robot",
-            flag="",
-            form="controller",
-            idle=effects.on_other_routes,
-        ),
-    ] = field(default_factory=_pursuit)
-    perception: Annotated[
-        Perception | None,
-        Setting(
-            "perception of movers, KIND or KIND:METRES: ground-truth positions, velocities or motions (their whole future), or "
-            "lidar (tracks from scans); with METRES, only within that range [m]",
-            "Movers",
-            "KIND[:METRES]",
-            key="sees",
-            form="perception",
-            usual="velocities; lidar without a map",
-            idle=effects.without_choice_of_perception,
-        ),
-    ] = None
-    avoidance: Annotated[
-        "Avoidance | None",
-        Setting(
-            "local avoidance of movers: true, false or none, or settings such as {horizon: 2.0}",
-            "Movers",
-            key="avoid",
-            form="avoidance",
-            idle=effects.without_movers,
-        ),
-    ] = field(default_factory=_avoidance)
-    replanning: Annotated[
-        ReplanPolicy | None,
-        Setting(
-            "replanning: true (around movers), false (only after deviations from the route), none (never), or settings such as "
-            "{patience: 10}",
-            "Movers",
-            key="replan",
-            form="replanning",
-            idle=effects.without_replans,
-        ),
-    ] = field(default_factory=ReplanPolicy)
-    unseen: Annotated[
-        "tuple[Disc, ...]",
-        Setting(
-            "cylinders {x, y, radius} [m] unknown to planner and controller",
-            "World",
-            "X,Y,RADIUS",
-            form="discs",
-        ),
-    ] = ()
-    time_limit: Annotated[
-        float | None,
+        since=2,
+        idle=idle_settings.without_odometry,
+    )
+    controller: "PurePursuit" = setting(  # noqa: RUF009
+        _pursuit,
+        "settings of the controller, such as {lookahead_time: 0.5}",
+        "Robot",
+        flag="",
+        form="controller",
+        idle=idle_settings.on_other_routes,
+    )
+    perception: Perception | None = setting(  # noqa: RUF009
+        None,
+        "perception of movers, KIND or KIND:METRES: ground-truth positions, velocities or motions (their whole future), or "
+        "lidar (tracks from scans); with METRES, only within that range [m]",
+        "Movers",
+        "KIND[:METRES]",
+        key="sees",
+        form="perception",
+        usual="velocities; lidar without a map",
+        idle=idle_settings.without_choice_of_perception,
+    )
+    avoidance: "Avoidance | None" = setting(  # noqa: RUF009
+        _avoidance,
+        "local avoidance of movers: true, false or none, or settings such as {horizon: 2.0}",
+        "Movers",
+        key="avoid",
+        form="avoidance",
+        idle=idle_settings.without_movers,
+    )
+    replanning: ReplanPolicy | None = setting(  # noqa: RUF009
+        ReplanPolicy,
+        "replanning: true (around movers), false (only after deviations from the route), none (never), or settings such as "
+        "{patience: 10}",
+        "Movers",
+        key="replan",
+        form="replanning",
+        idle=idle_settings.without_replans,
+    )
+    unseen: "tuple[Disc, ...]" = setting(  # noqa: RUF009
+        (), "cylinders {x, y, radius} [m] unknown to planner and controller", "World", "X,Y,RADIUS", form="discs"
+    )
+    time_limit: float | None = setting(
+        None,
+        "simulated time allowed [s]",
+        "World",
+        "SECONDS",
         Gt(0),
-        Setting(
-            "simulated time allowed [s]",
-            "World",
-            "SECONDS",
-            usual="the world's own, or 30 s plus ten times the route at full speed",
-        ),
-    ] = None
-    physics_hz: Annotated[
-        int,
+        usual="the world's own, or 30 s plus ten times the route at full speed",
+    )
+    physics_hz: int = setting(
+        240,
+        "physics steps per simulated second, 60 to 10000",
+        "Robot",
+        "",
         Ge(PHYSICS_HZ[0]),
         Le(PHYSICS_HZ[1]),
-        Setting("physics steps per simulated second, 60 to 10000", "Robot", flag=""),
-    ] = 240
-    control_hz: Annotated[
-        int,
+        flag="",
+    )
+    control_hz: int = setting(
+        60,
+        "control periods per simulated second, at least 10; must divide physics_hz",
+        "Robot",
+        "",
         Ge(SLOWEST_CONTROL),
-        Setting("control periods per simulated second, at least 10; must divide physics_hz", "Robot", flag=""),
-    ] = 60
-    seed: Annotated[
-        int,
+        flag="",
+    )
+    seed: int = setting(
+        0,
+        "seed of all random numbers",
+        "World",
+        "NUMBER",
         Ge(0),
         Le(2**63 - 1),
-        Setting("seed of all random numbers", "World", "NUMBER", axis=True, idle=effects.without_chance),
-    ] = 0
+        axis=True,
+        idle=idle_settings.without_chance,
+    )
 
     def __post_init__(self) -> None:
         for one in SETTINGS.values():
@@ -325,12 +313,9 @@ def _keeps(bound: Ge | Gt | Le, value: Any) -> bool:
 def declared(kind: type[Any]) -> Iterator[DeclaredSetting]:
     """Yield the settings that a record declares, in the order of its fields."""
     for one in dataclasses.fields(kind):
-        base, *notes = typing.get_args(one.type)
-        of = typing.get_args(base)
-        optional = type(None) in of
-        setting = next(note for note in notes if isinstance(note, Setting))
-        bounds = tuple(note for note in notes if isinstance(note, Ge | Gt | Le))
-        yield DeclaredSetting(one.name, of[0] if optional else base, optional, bounds, setting, one)
+        of = typing.get_args(one.type)
+        optional, kind_of = type(None) in of, of[0] if type(None) in of else one.type
+        yield DeclaredSetting(one.name, kind_of, optional, one.metadata["bounds"], one.metadata["setting"], one)
 
 
 #: Settings of a scenario by field name, in the order of tables.

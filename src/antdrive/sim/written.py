@@ -179,6 +179,17 @@ class Written:
             if not is_user_code(self.planner):
                 load_planner(self.planner, **self.options)
 
+    def check_settings(self, at: ErrorAt) -> None:
+        """Check the keys and values of settings; those of the controller load the compiler.
+
+        Args:
+            at: returns the error for a key
+        """
+        from antdrive.sim.forms import scenario_fields
+
+        with placed(at):
+            scenario_fields({key: value for key, value in self.settings.items() if value != "auto"})
+
     def load_task(self, home: Path | None = None) -> Task:
         """Return the world with start and goal.
 

@@ -1,6 +1,6 @@
 from .evaluation import CheckResult as CheckResult
-from .evaluation import check_case as check_case
-from .evaluation import check_cases as check_cases
+from .evaluation import evaluate_case as evaluate_case
+from .evaluation import evaluate_cases as evaluate_cases
 from .fixture import DriveFailure as DriveFailure
 from .fixture import DriveFixture as DriveFixture
 from .fixture import assert_collision_free as assert_collision_free

@@ -11,13 +11,13 @@ from antdrive.runs.pool import cores
 from antdrive.runs.suites import scenario_of, select
 from antdrive.runs.suites.suite import SUFFIX
 from antdrive.sim.scenario import Scenario
-from antdrive.testing.evaluation import CheckResult, Update, check_cases
+from antdrive.testing.evaluation import CheckResult, Update, evaluate_cases
 from antdrive.testing.python_tests import drive_python_tests, is_module
 from antdrive.testing.unused import unused_beside
 from antdrive.views.artefacts import Results
 
 
-def check_tests(
+def evaluate_tests(
     words: Sequence[str],
     *,
     only: str | None,
@@ -58,7 +58,7 @@ def check_tests(
             with suppress(InputError, FieldError):  # reported as the test's failure
                 scenario_of(case, choose)
     processes = min(jobs or cores(), len(cases))
-    for done, result in enumerate(check_cases(cases, jobs=processes, update=update, results=results), 1):
+    for done, result in enumerate(evaluate_cases(cases, jobs=processes, update=update, results=results), 1):
         outcomes.append(result)
         report(result)
         progress(done / len(cases))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-import os
 import shlex
 import tempfile
 import time
@@ -22,7 +21,7 @@ from antdrive.runs.suites.baseline import Baseline, fixed_hashes
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.evaluation import RAISED, Evaluation, changes, evaluate, explain, unmet_demands
 from antdrive.runs.suites.scenarios import run_command, scenario_of
-from antdrive.runs.suites.suite import SuiteCase, load_suite, shown_path
+from antdrive.runs.suites.suite import SuiteCase, shown_path
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
 from antdrive.sim.rerun import UNSTEADY, fingerprint, fingerprint_of, is_unsteady
@@ -103,7 +102,7 @@ class CheckResult:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check:
+class Criteria:
     """Criteria for a drive, and the destination of its results."""
 
     address: str  # the test's name in commands
@@ -231,12 +230,12 @@ class Check:
         return files, drove and films == "failed" and not filmed
 
 
-def _check_of(case: SuiteCase, update: Update, results: Results | None) -> Check:
-    """Return the check of a suite's test, with the command that runs only this test."""
+def _criteria_of(case: SuiteCase, update: Update, results: Results | None) -> Criteria:
+    """Return the criteria of a suite's test, with the command that runs only this test."""
     # Commands must work in the working directory; pytest's test names are relative to its rootdir.
     anywhere = results is not None and results.root.resolve() != Path.cwd().resolve()
     address = f"{case.suite}::{case.id}" if anywhere else case.address
-    return Check(
+    return Criteria(
         address=case.address,
         name=case.id,
         demands=case.demands,
@@ -246,11 +245,11 @@ def _check_of(case: SuiteCase, update: Update, results: Results | None) -> Check
         update=update,
         folder=results.of(case.suite, case.id) if results else None,
         results=results,
-        again=functools.partial(_fingerprint_by_name, str(case.suite), case.id),
+        again=functools.partial(_fingerprint_of, case),
     )
 
 
-def check_case(case: SuiteCase, *, update: Update = "", results: Results | None = None) -> CheckResult:
+def evaluate_case(case: SuiteCase, *, update: Update = "", results: Results | None = None) -> CheckResult:
     """Drive a suite's test and evaluate it.
 
     Args:
@@ -261,20 +260,20 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
     Raises:
         InputError: the suite, a file that it names, or the baseline is wrong.
     """
-    scenario, check = scenario_of(case), _check_of(case, update, results)
-    run_alone = run_command(case, anywhere=check.commands != (shlex.join(["antdrive", "check", case.address]),))
-    check = dataclasses.replace(check, commands=tuple(filter(None, (*check.commands, run_alone))))
+    scenario, criteria = scenario_of(case), _criteria_of(case, update, results)
+    run_alone = run_command(case, anywhere=criteria.commands != (shlex.join(["antdrive", "check", case.address]),))
+    criteria = dataclasses.replace(criteria, commands=tuple(filter(None, (*criteria.commands, run_alone))))
     try:
-        return check.evaluate(drive(scenario))
+        return criteria.evaluate(drive(scenario))
     except PlannerError as error:
-        return check.raised(scenario, error)
+        return criteria.raised(scenario, error)
 
 
-def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
-    """Return the result of a test; errors become failures, so that a broken test does not stop the others."""
+def _evaluate_or_fail(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
+    """Return the result of a test; errors of its drive become failures, so that they do not stop the others."""
     raised: Exception
     try:
-        return check_case(case, update=update, results=results)
+        return evaluate_case(case, update=update, results=results)
     except FieldError as error:
         outcome, fault, raised = INVALID_INPUT, str(case.error(error.key, error.problem)), error
     except InputError as error:
@@ -282,10 +281,10 @@ def _check_or_fail(case: SuiteCase, update: Update, results: Results | None) -> 
         outcome, raised = INVALID_INPUT, error
     except Exception as error:  # user planners may raise anything
         outcome, fault, raised = INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}", error
-    return _check_of(case, update, results).failed_early(outcome, fault, raised)
+    return _criteria_of(case, update, results).failed_early(outcome, fault, raised)
 
 
-def check_cases(
+def evaluate_cases(
     cases: Sequence[SuiteCase], *, jobs: int = 1, update: Update = "", results: Results | None = None
 ) -> Iterator[CheckResult]:
     """Drive and evaluate many tests. Yield the results in the order of the tests; they do not depend on `jobs`.
@@ -300,44 +299,28 @@ def check_cases(
     """
     with tempfile.TemporaryDirectory(prefix="antdrive-films-") as places:
         limited = results and dataclasses.replace(results, places=Path(places))
-        yield from _check_in_turn(cases, jobs, update, limited)
+        yield from _evaluate_in_turn(cases, jobs, update, limited)
 
 
-def _check_in_turn(
+def _evaluate_in_turn(
     cases: Sequence[SuiteCase], jobs: int, update: Update, results: Results | None
 ) -> Iterator[CheckResult]:
     if jobs == 1 or len(cases) == 1:
         for case in cases:
-            yield _check_or_fail(case, update, results)
+            yield _evaluate_or_fail(case, update, results)
         return
-    work = functools.partial(_check_by_name, str(Path.cwd()), update, results)
+    work = functools.partial(_evaluate_or_fail, update=update, results=results)
     with Pool(jobs) as pool:
-        made = pool.in_order(work, [(str(case.suite), case.id) for case in cases])
-        for case, done in zip(cases, made, strict=True):
+        for case, done in zip(cases, pool.in_order(work, cases), strict=True):
             if done.fault:
-                yield _check_of(case, update, results).failed_early(RAISED, done.died, WorkerDied(done.died))
+                yield _criteria_of(case, update, results).failed_early(RAISED, done.died, WorkerDied(done.died))
             elif done.died:
                 fault = f"internal error: {done.died}"
-                yield _check_of(case, update, results).failed_early(INTERNAL_ERROR, fault, WorkerDied(done.died))
-            elif isinstance(done.value, str):  # the suite changed after loading
-                yield _check_of(case, update, results).failed_early(INVALID_INPUT, done.value, InputError(done.value))
+                yield _criteria_of(case, update, results).failed_early(INTERNAL_ERROR, fault, WorkerDied(done.died))
             else:
                 yield done.value
 
 
-def _fingerprint_by_name(suite: str, test: str) -> str:
+def _fingerprint_of(case: SuiteCase) -> str:
     """Return the fingerprint of a test's scenario."""
-    return fingerprint(next(scenario_of(case) for case in load_suite(suite) if case.id == test))
-
-
-def _check_by_name(folder: str, update: Update, results: Results | None, name: tuple[str, str]) -> CheckResult | str:
-    """Return the result of a test named by another process, or an error message if the test was removed."""
-    os.chdir(folder)
-    suite, test = name
-    try:
-        case = next((case for case in load_suite(suite) if case.id == test), None)
-    except InputError as error:
-        return str(error)
-    if case is None:
-        return f"{suite}: test {test} was removed during the run"
-    return _check_or_fail(case, update, results)
+    return fingerprint(scenario_of(case))

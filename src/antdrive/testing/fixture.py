@@ -22,7 +22,7 @@ from antdrive.sim.pipeline import run as drive_scenario
 from antdrive.sim.rerun import fingerprint
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.settings import tested_settings
-from antdrive.testing.evaluation import Check, CheckResult, Update
+from antdrive.testing.evaluation import CheckResult, Criteria, Update
 from antdrive.views.artefacts import Results, portable_name
 from antdrive.worlds import Task, list_worlds
 
@@ -119,7 +119,7 @@ class DriveFixture:
         self._names.add(name)
         scenario = self._scenario(world, planner, robot, settings)
         whole = f"{self._test}-{name}" if name else self._test
-        check = Check(
+        criteria = Criteria(
             address=self._address,
             name=whole,
             demands=demands,
@@ -134,10 +134,10 @@ class DriveFixture:
         try:
             run = drive_scenario(scenario)
         except PlannerError as error:
-            result = check.raised(scenario, error)
+            result = criteria.raised(scenario, error)
             self._report(result)
             raise DriveFailure(result) from error
-        result = check.evaluate(run)
+        result = criteria.evaluate(run)
         self._report(result)
         if not result.passed:
             raise DriveFailure(result)

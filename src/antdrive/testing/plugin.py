@@ -105,11 +105,11 @@ class DriveItem(pytest.Item):
 
     def runtest(self) -> None:
         """Drive and evaluate."""
-        from antdrive.testing.evaluation import check_case
+        from antdrive.testing.evaluation import evaluate_case
         from antdrive.testing.fixture import DriveFailure
 
         report_compiling(self.config)
-        result = check_case(self.case, update=update_of(self.config), results=results_of(self.config))
+        result = evaluate_case(self.case, update=update_of(self.config), results=results_of(self.config))
         note(self, result)
         if not result.passed:
             raise DriveFailure(result)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from antdrive.base.atomic import atomic_write
 from antdrive.base.files import without_waiting
+from antdrive.base.tables import markdown_text
 from antdrive.testing.evaluation import CheckResult
 
 #: Metrics in test reports.
@@ -101,7 +101,8 @@ def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
         text += [
             "| "
             + " | ".join(
-                _cell(drive.get(key, "")) for key in ("test", "outcome", "min_clearance_m", "duration_s", "fault")
+                markdown_text(_plain(drive.get(key, "")))
+                for key in ("test", "outcome", "min_clearance_m", "duration_s", "fault")
             )
             + " |"
             for drive in failed
@@ -110,11 +111,12 @@ def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
     better = [drive for drive in drives if drive.get("gains") and drive["passed"] == "true"]
     if better:
         text += [
-            f"{len(better)} better than their baselines: " + ", ".join(_cell(drive["test"]) for drive in better),
+            f"{len(better)} better than their baselines: "
+            + ", ".join(markdown_text(_plain(drive["test"])) for drive in better),
             "",
         ]
     if unused:
-        text += ["Unused baselines: " + ", ".join(_cell(path) for path in unused), ""]
+        text += ["Unused baselines: " + ", ".join(markdown_text(_plain(path)) for path in unused), ""]
     return "\n".join(text) + "\n"
 
 
@@ -153,8 +155,3 @@ def add_to_page(drives: Iterable[Mapping[str, str]], unused: Sequence[str], say:
 
 def _plain(text: str) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
-
-
-def _cell(text: str) -> str:
-    """Escape a text for Markdown."""
-    return re.sub(r"[&<>|`*_~\[\]\\@#]", lambda match: f"&#{ord(match[0])};", _plain(text))

@@ -94,20 +94,6 @@ def pale_bodies(
                     frame[row, col, k] = np.uint8(value + (colour[k] - value) * share + 0.5)
 
 
-@inline
-def _direction(dx: float, dy: float) -> float:
-    """Return the direction of a vector, -pi to pi, to 0.00001 rad (M. Abramowitz, I. Stegun, 1964, 4.4.49)."""
-    ax, ay = abs(dx), abs(dy)
-    t = min(ax, ay) / max(max(ax, ay), 1e-12)
-    s = t * t
-    a = t * (0.9998660 + s * (-0.3302995 + s * (0.1801410 + s * (-0.0851330 + s * 0.0208351))))
-    if ay > ax:
-        a = 0.5 * math.pi - a
-    if dx < 0.0:
-        a = math.pi - a
-    return -a if dy < 0.0 else a
-
-
 @kernel
 def lay_fan(
     frame: Array, visible: Array, fwd: Array, inv: Array, eye: Array, first: float, spacing: float, closed: bool,
@@ -136,7 +122,7 @@ def lay_fan(
             away = math.sqrt(dx * dx + dy * dy)
             if away >= far:
                 continue
-            k = (_direction(dx, dy) - base) / spacing
+            k = (math.atan2(dy, dx) - base) / spacing
             if k < -0.5:
                 k += full
             nearest = math.floor(k + 0.5)

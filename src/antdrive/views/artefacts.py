@@ -18,6 +18,7 @@ import numpy as np
 
 from antdrive.base.atomic import write_text
 from antdrive.base.files import write_json
+from antdrive.base.kernel_cache import user_cache, writable
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.evaluation import divergence
 from antdrive.runs.suites.suite import SUFFIX
@@ -90,15 +91,10 @@ def portable_name(name: str) -> str:
 def cached_results(root: Path) -> Path:
     """Return the folder of a project's results in the user's cache, or a temporary folder if the cache is read-only."""
     name = f"{portable_name(root.name or 'root')}-{zlib.crc32(str(root).encode()):08x}"
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
     user = os.getuid() if hasattr(os, "getuid") else "user"
-    for folder in (cache / "antdrive" / "results", Path(tempfile.gettempdir()) / f"antdrive-results-{user}"):
-        try:
-            (folder / name).mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=folder / name).close()
-        except OSError:
-            continue
-        return folder / name
+    for folder in (user_cache() / "antdrive" / "results", Path(tempfile.gettempdir()) / f"antdrive-results-{user}"):
+        if writable(folder / name):
+            return folder / name
     return Path(tempfile.mkdtemp(prefix="antdrive-results-"))
 
 

@@ -45,11 +45,6 @@ class MapReconstruction:
         self._reset_times = [tick / rollout.record.control_hz for tick in ticks]
 
     @property
-    def times(self) -> Floats:
-        """Times of the scans (S,) [s]."""
-        return self._times
-
-    @property
     def explored(self) -> float:
         """Known area of the map, free or hit [m²]."""
         return float(np.count_nonzero(self.seen)) * self.map.cell**2

@@ -115,10 +115,10 @@ def _write_figures(run: Run, folder: Path, kinds: Sequence[str]) -> dict[str, st
         if run.certificate is not None:
             files["certificate" + end] = str(folder / f"certificate{suffix}")
             certificate_figure(run.rollout, run.certificate, files["certificate" + end])
-        if run.rollout.record.exploring and len(run.rollout.scans):
+        if run.rollout.record.mapless and len(run.rollout.scans):
             files["sight" + end] = str(folder / f"sight{suffix}")
             sight_figure(run.rollout, files["sight" + end])
-    known: dict[str, Any] = {"name": s.planner_name, "suffixes": kinds, "mapped": s.map == "given"}
+    known: dict[str, Any] = {"name": s.planner_name, "suffixes": kinds, "mapped": not s.mapless}
     made = plan_figures(s.task, run.grid, run.plan, s.robot, folder, **known)
     return files | {name: str(path) for name, path in made.items()}
 

@@ -59,7 +59,7 @@ class Scene:
             inflate=record.inflate if record.footprint_margin is None else record.footprint_margin,
             margin=record.kept_margin,
             outlined=record.footprint_margin is not None,
-            mapped=not record.exploring,
+            mapped=not record.mapless,
             mover_radii=tuple(mover.radius for mover in world.movers),
             movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
             movers_at=float(rollout.t[-1]) if len(rollout.t) else 0.0,

@@ -13,7 +13,7 @@ import numpy as np
 from antdrive.base.caches import Keyed, bits
 from antdrive.base.errors import FieldError, require
 from antdrive.base.plane import format_disc, format_number, format_numbers, format_point
-from antdrive.base.records import derived
+from antdrive.base.records import unchecked_copy
 from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.limits import MAX_CELLS, MAX_WALK, Coordinate, Size
 from antdrive.worlds.motions import Motion, first_cell, is_within, motion_of, path_ahead, require_few_draws
@@ -174,7 +174,7 @@ class PointWorld(World):
 
     def among(self, bounds: Bounds, discs: Floats) -> PointWorld:
         """Return the world of other cylinders (N, 3) between other walls, unchecked: they are made of checked ones."""
-        made = derived(self, bounds=bounds, _discs=discs)
+        made = unchecked_copy(self, bounds=bounds, _discs=discs)
         del vars(made)["obstacles"]
         return made
 

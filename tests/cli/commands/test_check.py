@@ -13,7 +13,7 @@ from antdrive import Run, run
 from antdrive.runs.suites import Baseline
 from antdrive.sim.written import Written
 from antdrive.testing import evaluation
-from antdrive.testing.checking import check_tests
+from antdrive.testing.checking import evaluate_tests
 from antdrive.views.artefacts import Results
 from antdrive.views.figures import run_figures
 
@@ -285,14 +285,14 @@ def test_a_process_for_each_core_that_may_be_used(cores, asked, started, monkeyp
     found: list[int] = []
     case = SimpleNamespace(written=Written(world="empty"))
 
-    def check_cases(cases, *, jobs, **others):
+    def evaluate_cases(cases, *, jobs, **others):
         found.append(jobs)
         return []
 
     monkeypatch.setattr("joblib.cpu_count", lambda: cores)
     monkeypatch.setattr("antdrive.testing.checking.select", lambda words, only: [case] * 10)
-    monkeypatch.setattr("antdrive.testing.checking.check_cases", check_cases)
+    monkeypatch.setattr("antdrive.testing.checking.evaluate_cases", evaluate_cases)
     monkeypatch.setattr("antdrive.testing.checking.unused_beside", lambda suites: [])
     how = dict.fromkeys(("choose", "report", "progress"), print)
-    assert check_tests(["a"], only=None, jobs=asked, update="", results=Results(tmp_path), **how) == ([], [])
+    assert evaluate_tests(["a"], only=None, jobs=asked, update="", results=Results(tmp_path), **how) == ([], [])
     assert found == [started]

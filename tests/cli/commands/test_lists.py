@@ -14,7 +14,7 @@ from antdrive.base.optional import PLANNER_GROUP
 from antdrive.cli.groups import exit_code_of
 from antdrive.cli.listings import LISTS
 from antdrive.planners import PLANNERS
-from antdrive.robots import PurePursuit, RobotSpec
+from antdrive.robots import PurePursuit, RobotSpec, list_robots
 from antdrive.worlds import Disc, Task, World, list_worlds, load_task, save_task
 
 
@@ -96,11 +96,11 @@ def test_the_schema_of_a_file_is_printed(antdrive, words):
     assert json.loads(out)["title"] == f"antdrive {words[0] if words else 'world'}"
 
 
-def test_every_world_is_listed(antdrive):
-    assert "han2007-aco" in antdrive("worlds", "list")[1]
-    code, out, err = antdrive("worlds", "list", "--json")
+@pytest.mark.parametrize(("kind", "known"), [("worlds", list_worlds()), ("robots", list_robots())])
+def test_every_world_and_robot_is_listed(antdrive, kind, known):
+    code, out, err = antdrive(kind, "list", "--json")
     assert (code, err) == (0, "")
-    assert list(json.loads(out)) == list(list_worlds())
+    assert list(json.loads(out)) == list(known)
 
 
 def test_show_reports_whether_a_robot_can_cross(antdrive, tmp_path):

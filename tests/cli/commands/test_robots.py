@@ -8,13 +8,6 @@ from antdrive.robots import load_robot
 URDF = Path(__file__).parents[2] / "robots" / "importing" / "urdf"
 
 
-def test_every_robot_is_listed(antdrive):
-    assert "jackal" in antdrive("robots")[1]
-    code, out, err = antdrive("robots", "--json")
-    assert (code, err) == (0, "")
-    assert {"turtlebot", "jackal"} <= set(json.loads(out))
-
-
 def test_the_file_of_a_robot_is_printed_as_a_start_for_another(antdrive, tmp_path):
     code, text, _ = antdrive("robots", "jackal")
     assert code == 0

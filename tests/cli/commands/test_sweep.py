@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.base.atomic import folder_lock
-from antdrive.cli.console import campaign_bar, duration
+from antdrive.base.progress import bar, duration
 from antdrive.cli.groups import _without_again
 from antdrive.runs.campaigns import read_results
 from tests.runs.canonical import canonical_bytes
@@ -165,9 +165,10 @@ def test_times_are_told_in_fitting_units(seconds, words):
 
 
 def test_a_campaign_whose_output_goes_to_a_file_is_noted_each_minute(monkeypatch, capsys):
-    now = iter([0.0, 0.0, 30.0, 60.0, 90.0, 120.0])  # once before the campaign, then for each run
-    monkeypatch.setattr("antdrive.cli.console.time.monotonic", lambda: next(now))
-    with campaign_bar("driving") as update:
+    now = 0.0
+    monkeypatch.setattr("antdrive.base.progress.time.monotonic", lambda: now)
+    with bar("driving") as update:
         for done in range(5):
+            now = 30.0 * done
             update(done, 4)
     assert capsys.readouterr().err == "antdrive: driving: 2 of 4 runs, 0.0 runs/s, 60 s left\n"

@@ -31,11 +31,6 @@ def assert_feasible(result, query):
     assert result.length == pytest.approx(polyline_length(xy), abs=1e-9)
 
 
-def test_the_registered_defaults_are_those_of_the_thesis():
-    assert (GaHan().population, GaHan().iterations, GaHan().crossover, GaHan().mutation) == (100, 100, 0.25, 0.2)
-    assert GaHan().elitism
-
-
 def test_the_median_of_20_seeds_beats_the_thesis():
     query = single()
     results = [solve(query, seed) for seed in range(20)]
@@ -129,10 +124,6 @@ def test_a_bare_grid_is_planned_on_its_free_cells():
         assert answer.solved == bool(len(answer.cells))
 
 
-def test_options_are_read():
-    assert load_planner("ga-han", via_points="2", elitism="no") == GaHan(via_points=2, elitism=False)
-
-
 def of_catalogue(name):
     task = load_task(name)
     return Query.between(rasterise(task.world, task.cell, 0.363), task)
@@ -176,11 +167,6 @@ def test_all_chromosomes_are_feasible_in_every_generation():
     result = hybrid(of_catalogue("forest"), iterations=40)
     assert (result.history.arrived[30:] == Hybrid().population).all()
     assert result.field.max() == Hybrid().population
-
-
-def test_a_straight_line_stays_straight():
-    query = of_catalogue("empty")
-    assert hybrid(query).length == pytest.approx(np.hypot(*np.subtract(query.task.goal, query.task.start[:2])))
 
 
 def test_interrupted_during_the_ants_it_returns_their_pulled_path():

@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from antdrive.planners import AcoHan, Iteration, PlanStatus, PotentialFieldAnts, Progress, keep_best, on_progress
-from antdrive.planners.colonies.colony import ColonyGraph, IterationState, TourConstruction, without_loops
+from antdrive.planners import AcoHan, PlanStatus, PotentialFieldAnts, Progress, keep_best, on_progress
+from antdrive.planners.colonies.colony import ColonyGraph, IterationState, TourConstruction, cut
 from antdrive.worlds import DIRECTIONS
 from tests.planners.colonies.test_colony import DIRECT, OPEN, walks
 from tests.planners.worlds_to_solve import catalogue
@@ -12,7 +12,7 @@ from tests.planners.worlds_to_solve import catalogue
 
 def state(graph, walked, best):
     """Return the first iteration of a colony, with these walks."""
-    tours = without_loops(walked, graph)
+    tours = cut(walked, graph, short=False)
     return IterationState(0, graph, walked, tours, None, best, 0, np.random.default_rng(0))
 
 
@@ -102,17 +102,11 @@ def test_each_loop_of_a_walk_is_cut_out_as_it_closes():
             walk += [(r + dr, c + dc)] * (0 <= r + dr < 3 and 0 <= c + dc < 4)
         for cell in walk:
             kept = [*kept[: kept.index(cell)], cell] if cell in kept else [*kept, cell]
-        tours = without_loops(walks(walk), graph)
+        tours = cut(walks(walk), graph, short=False)
         assert list(map(tuple, graph.cells(tours.cells[0, : tours.sizes[0]]).tolist())) == kept
         assert tours.lengths[0] == pytest.approx(walks(kept).lengths[0])
         loops += len(walk) - len(kept)
     assert loops > 100
-
-
-@pytest.mark.parametrize("world", ["trap", "slalom"])
-def test_a_returned_path_visits_no_cell_twice(world):
-    result = AcoHan(ants=40, iterations=3).plan(catalogue()[world], np.random.default_rng(2))
-    assert len({tuple(c) for c in result.cells}) == len(result.cells)
 
 
 @pytest.mark.parametrize("planner", [AcoHan(ants=50, iterations=8), PotentialFieldAnts(ants=50, iterations=20)])
@@ -221,10 +215,3 @@ def test_ctrl_c_before_any_ant_arrives_is_stopped_without_a_path():
         result = AcoHan(ants=5, max_steps=2).plan(catalogue()["empty"], np.random.default_rng(0))
     assert result.status is PlanStatus.STOPPED
     assert "interrupted" in result.reason
-
-
-def test_iterate_yields_one_iteration_at_a_time():
-    states = AcoHan(ants=20).iterate(catalogue()["empty"], np.random.default_rng(0))
-    first = next(states)
-    assert isinstance(first, Iteration)
-    assert next(states).best <= first.best

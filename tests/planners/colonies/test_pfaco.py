@@ -15,26 +15,19 @@ from tests.planners.worlds_to_solve import catalogue, optimum
 OPEN = Query(Grid.from_free(np.ones((4, 5))), (0, 0), (3, 4))
 
 
-def test_the_potential_matches_a_hand_calculation():
+@pytest.mark.parametrize("repulsion", [8.0, -8.0])  # eq. 7, taken literally, adds U_rep: obstacles attract
+def test_the_potential_matches_a_hand_calculation(repulsion):
     free = np.ones((4, 5))
     free[0, 4] = 0
-    planner = PotentialFieldAnts(attraction=2.0, repulsion=8.0, influence=2.0)
+    planner = PotentialFieldAnts(attraction=2.0, repulsion=repulsion, influence=2.0)
     field = planner.potential(Query(Grid.from_free(free), (0, 0), (3, 4))).reshape(4, 5)
     # k/2 d^2 from the start (eq. 9), less k_rep/2 (1/d - 1/d0)^2 within d0 of a blocked cell (eq. 11)
-    beside = 9.0 - 4.0 * (1 - 0.5) ** 2
-    aslant = 1.0 * (1 + 9) - 4.0 * (1 / math.sqrt(2) - 0.5) ** 2
+    beside = 9.0 - repulsion / 2 * (1 - 0.5) ** 2
+    aslant = 1.0 * (1 + 9) - repulsion / 2 * (1 / math.sqrt(2) - 0.5) ** 2
     expected = {(0, 0): 0.0, (3, 4): 25.0, (0, 3): beside, (1, 3): aslant, (2, 4): 20.0}
     for cell, value in expected.items():
         assert field[cell] == pytest.approx(value + 1.0), cell  # shifted above 0 by attraction / 2
     assert field[0, 4] == 0
-
-
-def test_obstacles_attract_where_eq_7_is_taken_literally():
-    free = np.ones((4, 5))
-    free[0, 4] = 0
-    planner = PotentialFieldAnts(attraction=2.0, repulsion=-8.0, influence=2.0)
-    field = planner.potential(Query(Grid.from_free(free), (0, 0), (3, 4))).reshape(4, 5)
-    assert field[0, 3] - field[0, 0] == pytest.approx(9.0 + 4.0 * (1 - 0.5) ** 2)  # U_att + U_rep
 
 
 def test_a_potential_measured_from_the_goal_is_highest_there():

@@ -57,24 +57,9 @@ def test_the_potential_follows_equations_7_9_and_11():
     np.testing.assert_array_equal(np.isinf(field), ~query.grid.free)
 
 
-def test_obstacles_beyond_their_influence_do_not_count():
-    query = among(Disc(1.0, 4.5, 0.3))
-    path, bare = (p.plan(query, RNG).cells for p in (PotentialField(influence=0.3), BARE))
-    np.testing.assert_array_equal(path, bare)
-
-
 def test_on_an_empty_grid_the_path_is_a_shortest_one():
     query = Query(Grid.from_free(np.ones((30, 40)), cell=0.25), (2, 3), (22, 37))
     assert PotentialField().plan(query, RNG).cost == pytest.approx(optimum(query), abs=1e-9)
-
-
-def test_a_disc_off_the_line_is_passed_at_a_distance():
-    query = among(Disc(3.0, 2.7, 0.2), cell=0.1)
-    distance = obstacle_distance(query)
-    wary, bare = (p.plan(query, RNG) for p in (PotentialField(k_rep=0.5, influence=1.0), BARE))
-    assert wary.solved
-    assert bare.solved
-    assert distance[tuple(wary.cells.T)].min() > distance[tuple(bare.cells.T)].min() + 0.1
 
 
 @pytest.mark.parametrize("planner", [PotentialField(), BARE, PotentialField(k_rep=1.0, influence=2.0)])

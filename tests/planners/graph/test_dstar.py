@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from antdrive.planners import DStar, DStarLite, Query
 from antdrive.planners.graph import _kernels_incremental as kernels
-from antdrive.planners.graph._kernels_incremental import DIAGONAL, NEVER, STRAIGHT
+from antdrive.planners.graph._kernels_incremental import DIAGONAL, STRAIGHT
 from antdrive.worlds import Grid
 from tests.planners.replanning.agreement import World, agree
 
@@ -99,43 +99,6 @@ def test_the_cost_of_thousands_of_steps_is_exact():
     result = DStarLite().plan(query, RNG)
     assert abs(result.cost - World(query.grid).optimum(query.start, query.goal)) < 1e-9
     assert math.isfinite(result.cost)
-
-
-def corridor():
-    """Return a grid with two paths to the goal: a short one along row 1, a long one along row 5."""
-    free = np.zeros((7, 12), dtype=np.bool_)
-    free[1, 1:11] = free[5, 1:11] = True
-    free[1:6, [1, 10]] = True
-    return DStar().replanner(Query(Grid.from_free(free), (1, 1), (1, 10)), RNG)
-
-
-def test_a_blocked_corridor_raises_the_costs_of_paths_through_it():
-    repair = corridor()
-    assert repair.result().cost == 9
-    repair.block([(1, 6)])
-    assert repair.result().cost == 4 + 9 + 4
-    heights = repair._arrays[0].reshape(7, 12)
-    assert heights[1, 1] == 17 * STRAIGHT
-    assert heights[1, 5] >= NEVER  # RAISE; costs that the robot does not need are not computed
-    assert heights[1, 7] == 3 * STRAIGHT  # between the block and the goal nothing changed
-    repair.move((1, 5))
-    assert repair.result().cost == 17 + 4
-
-
-def test_a_new_gap_lowers_the_costs_of_cells_behind_it():
-    repair = corridor()
-    repair.block([(1, 6)])
-    repair.result()
-    repair.clear([(1, 6)])
-    assert repair.result().cost == 9
-    assert repair._arrays[0].reshape(7, 12)[1, 5] == 5 * STRAIGHT
-
-
-def test_a_change_away_from_the_path_is_not_processed():
-    repair = corridor()
-    repair.result()
-    repair.block([(3, 1)])  # farther from the goal than the robot
-    assert repair.result().work == 0
 
 
 @pytest.mark.parametrize("size", [1, 2])

@@ -1,7 +1,5 @@
 """Properties of every incremental search."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -61,42 +59,6 @@ def test_repairs_equal_the_oracle_after_any_sequence_of_changes(planner, bits, e
 
 
 @BOTH
-def test_a_drive_through_an_unknown_map(planner):
-    """The robot detects cells within three cells, treats all others as free, and replans at every step."""
-    rng = np.random.default_rng(1)
-    truth = rng.random((40, 40)) >= 0.25
-    truth[1, 1] = truth[38, 38] = True
-    replanner = planner.replanner(open_ground(40, 40), RNG)
-    world = World(replanner.query.grid)
-    steps = 0
-    while replanner.query.start != replanner.query.goal and steps < 2000:
-        (r, c), steps = replanner.query.start, steps + 1
-        window = np.s_[max(0, r - 3) : r + 4, max(0, c - 3) : c + 4]
-        seen = np.argwhere(~truth[window]) + [max(0, r - 3), max(0, c - 3)]
-        replanner.block(seen)
-        world.free[tuple(seen.T)] = False
-        if not agree(replanner, world):
-            break
-        replanner.move(tuple(map(int, replanner.result().cells[1])))
-    assert steps > 39
-
-
-@BOTH
-def test_a_path_is_closed_and_opened_again_by_a_wall(planner):
-    replanner = planner.replanner(open_ground(), RNG)
-    before = replanner.result()
-    wall = [(6, c) for c in range(12)]
-    assert replanner.block(wall) == 36  # the wall and the rows beside it
-    shut = replanner.result()
-    assert shut.status is PlanStatus.NO_PATH
-    assert "allowed moves" in shut.reason
-    assert math.isinf(shut.cost)
-    assert len(shut.cells) == 0
-    assert replanner.clear(wall) == 36
-    assert replanner.result().cost == before.cost
-
-
-@BOTH
 @pytest.mark.parametrize("end", ["start", "goal"])
 def test_a_blocked_end_is_named_and_can_be_cleared(planner, end):
     replanner = planner.replanner(open_ground(), RNG)
@@ -107,29 +69,6 @@ def test_a_blocked_end_is_named_and_can_be_cleared(planner, end):
     assert f"the {end} cell" in blocked.reason
     replanner.clear([getattr(replanner.query, end)])
     assert replanner.result().cost == cost
-
-
-@BOTH
-def test_the_end_of_an_isolated_cell_can_be_blocked(planner):
-    free = np.zeros((3, 3))
-    free[1, 1] = 1
-    replanner = planner.replanner(Query(Grid.from_free(free), (1, 1), (1, 1)), RNG)
-    assert replanner.result().cost == 0
-    assert replanner.block([(1, 1)]) == 0  # it had no moves to lose
-    assert replanner.result().status is PlanStatus.NO_PATH
-
-
-@BOTH
-def test_moves_that_discs_close_stay_closed(planner):
-    rng = np.random.default_rng(7)
-    for _ in range(30):
-        query = random_discs(rng)
-        replanner = planner.replanner(query, RNG)
-        cells = rng.choice(np.argwhere(query.grid.free), size=6)
-        replanner.block(cells)
-        replanner.clear(cells)
-        np.testing.assert_array_equal(replanner.query.grid.moves, query.grid.moves)
-        np.testing.assert_array_equal(replanner.query.grid.free, query.grid.free)
 
 
 @BOTH

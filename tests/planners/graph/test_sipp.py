@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.planners import PlanStatus, Query, TimedPlan, load_planner, plan_in_time
+from antdrive.planners import PlanStatus, Query, TimedPlan, load_planner, plan_in_time, validate_plan
 from antdrive.planners.graph.sipp import TOLERANCE, _legs, _samples
 from antdrive.worlds import Grid, MoverMotion
 from tests.planners.worlds_to_solve import optimum, random_query
@@ -171,18 +171,6 @@ def test_no_path_arrives_sooner_and_none_is_missed(seeds, stay):
     assert without > 0
 
 
-def test_reaching_a_goal_that_must_stay_safe_may_take_longer(small_plans):
-    later = 0
-    for query, movers, plan in small_plans:
-        stays = plan_in_time(query, movers, speed=SPEED, horizon=HORIZON, stay=True)
-        assert stays.duration >= plan.duration - 1e-9
-        if stays.solved:
-            t = np.linspace(stays.arrive[-1], HORIZON, 2000)
-            assert all(np.hypot(*(m.at(t) - stays.xy[-1]).T).min() >= m.radius + INFLATE for m in movers)
-        later += plan.solved and stays.duration > plan.duration
-    assert later > 3
-
-
 def test_the_distance_is_kept_at_every_instant(small_plans):
     careless = 0
     for query, movers, plan in small_plans:
@@ -201,18 +189,11 @@ def test_a_timed_plan_moves_at_its_speed_along_allowed_moves(small_plans):
             assert plan.reason
             assert math.isinf(plan.duration)
             continue
-        assert tuple(plan.cells[0]) == query.start
-        assert tuple(plan.cells[-1]) == query.goal
-        steps = np.diff(plan.cells, axis=0)
-        far = CELL * np.hypot(*steps.T)
+        assert validate_plan(query, plan) == ""
+        far = CELL * np.hypot(*np.diff(plan.cells, axis=0).T)
         np.testing.assert_allclose(plan.arrive[1:] - plan.leave[:-1], far / SPEED, atol=1e-9)
-        assert (plan.leave >= plan.arrive).all()
         assert plan.arrive[0] == 0.0
-        assert plan.cost == pytest.approx(far.sum())
         assert plan.duration == pytest.approx(plan.cost / SPEED + plan.waited)
-        for (r, c), (dr, dc) in zip(plan.cells, steps, strict=False):
-            assert query.grid.free[r + dr, c]
-            assert query.grid.free[r, c + dc]
         np.testing.assert_allclose(plan.at(plan.arrive), plan.xy)
         np.testing.assert_allclose(plan.at(plan.leave), plan.xy)
         waits += plan.waited > 0
@@ -253,13 +234,6 @@ def test_a_robot_backs_into_a_bay_to_let_a_mover_pass():
     shut = plan_in_time(Query(ground(free[:1]), (0, 2), (0, 8)), [oncoming], speed=SPEED, horizon=60)
     assert shut.status is PlanStatus.NO_PATH
     assert "within 60 s" in shut.reason
-
-
-def test_two_robots_do_not_change_places_through_each_other():
-    """A corridor never has room for both the robot and an oncoming mover."""
-    swap = Passing(0.05, (1.0, 0.0), (-0.5, 0.0))
-    plan = plan_in_time(corridor(3), [swap], speed=SPEED, horizon=10)
-    assert plan.status is PlanStatus.NO_PATH
 
 
 def test_without_movers_it_is_the_shortest_path():

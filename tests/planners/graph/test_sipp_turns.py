@@ -79,31 +79,17 @@ def test_no_path_of_an_outline_arrives_sooner_and_none_is_missed(seeds, stay):
         ]
         assert validate_plan(query, plan) == ""
         assert bounds[1] - TICK - 1e-9 <= plan.duration <= bounds[0] + 1e-9
+        if plan.solved:
+            heading = np.arctan2(*np.diff(plan.xy, axis=0).T[::-1])
+            least = np.abs(wrap_angle(np.diff(heading))) / YAW_RATE
+            assert (plan.leave[1:-1] - plan.arrive[1:-1] >= least - 1e-9).all()
+            assert plan.clearance(movers, step=0.002) >= RADIUS
         without += math.isinf(bounds[1])
         if math.isfinite(bounds[0]):
             gaps.append(bounds[0] - bounds[1])
     assert np.median(gaps) < 1.0
     assert len(gaps) > len(seeds) / 4
     assert without > 0
-
-
-def test_a_plan_leaves_the_time_for_its_turns_and_keeps_its_distance():
-    turns = waits = 0
-    for seed in range(25):
-        _, grid, movers, rng = small_world(seed)
-        query, _ = some_query(grid, rng)
-        plan = plan_in_time(query, movers, speed=SPEED, yaw_rate=YAW_RATE, horizon=HORIZON)
-        if not plan.solved:
-            continue
-        steps = np.diff(plan.xy, axis=0)
-        heading = np.arctan2(steps[:, 1], steps[:, 0])
-        least = np.abs(wrap_angle(np.diff(heading))) / YAW_RATE
-        assert (plan.leave[1:-1] - plan.arrive[1:-1] >= least - 1e-9).all()
-        assert plan.clearance(movers, step=0.002) >= RADIUS
-        turns += int((least > 0).sum())
-        waits += plan.waited > least.sum() + 1e-9
-    assert turns > 8
-    assert waits > 0
 
 
 def test_on_open_ground_a_plan_lasts_as_long_as_its_lead_its_moves_and_its_turns():

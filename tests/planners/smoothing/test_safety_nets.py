@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from antdrive.planners.smoothing import _kernels_smooth as kernels
-from antdrive.planners.smoothing.smooth import NOTES, _clears, _pulled, _runs, _smoothed
+from antdrive.planners.smoothing.smooth import NOTES, _pulled, _runs, _smoothed, pull_taut
 from antdrive.worlds import Disc, World, segment_clearance
 
 INFLATE = 0.2
@@ -41,7 +41,7 @@ def test_a_line_on_the_other_side_is_refused():
 def test_a_line_that_comes_closer_than_the_clearance_is_refused(closer, refused):
     xy = over(3.7 - closer)
     assert ("closer than the clearance" in rejection(xy)) is refused
-    assert (not _clears(xy, WORLD.discs, WORLD.bounds, INFLATE)) is (closer > 1e-9)
+    assert (pull_taut(xy, WORLD.discs, WORLD.bounds, INFLATE) is None) is (closer > 1e-9)
     assert len(list(_runs(segment_clearance(WORLD, xy[:-1], xy[1:]), INFLATE))) == (3 if closer > 2e-9 else 1)
 
 

@@ -3,9 +3,6 @@
 import dataclasses
 import itertools
 import math
-import tarfile
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,22 +12,17 @@ from hypothesis import strategies as st
 from antdrive.planners import AStar, PlanResult, PlanStatus, Query, load_planner, path_cost
 from antdrive.planners.anyangle.tangent import Arc, Line, shortest
 from antdrive.planners.smoothing.smooth import SMOOTHINGS, pull_taut, smooth
-from antdrive.robots import load_robot
 from antdrive.worlds import (
     Disc,
     Route,
     Task,
     World,
     forest,
-    import_barn,
-    list_worlds,
-    load_task,
     point_clearance,
     polyline_clearance,
     rasterise,
 )
 from tests.planners.worlds_to_solve import catalogue as small_worlds
-from tools.shared_data import BARN
 
 RNG = np.random.default_rng(0)  # unused by these planners
 SMOOTHED = ("taut", "clearance")
@@ -280,66 +272,6 @@ def test_every_planners_plans_are_smoothed(name):
     assert solved
 
 
-@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
-def test_the_catalogue_is_smoothed_for_both_robots(robot):
-    for path in list_worlds().values():
-        task = load_task(path)
-        grid = rasterise(task.world, task.cell, load_robot(robot).radius + 0.03)
-        query = Query.between(grid, task)
-        for name in ("astar", "tangent"):
-            plan = load_planner(name).plan(query, RNG)
-            if not plan.solved:
-                continue
-            line = smooth(plan, grid, task, kind="none")
-            longest = max(line.length, plan.cost if math.isfinite(plan.cost) else 0.0)
-            for kind in SMOOTHED:
-                route = smooth(plan, grid, task, kind=kind)
-                check(route, line, task, grid.inflate, longest=longest)
-                assert route.kind == kind
-
-
-# -- BARN
-
-
-@cache
-def barn():
-    return tuple(_barn())
-
-
-def _barn():
-    import tempfile
-
-    with tempfile.TemporaryDirectory() as folder, tarfile.open(BARN) as archive:
-        for n in range(0, 300, 36):
-            (member,) = (one for one in archive.getmembers() if Path(one.name).name == f"world_{n}.world")
-            archive.extract(member, folder, filter="data")
-            yield import_barn(Path(folder) / member.name)
-
-
-@pytest.mark.skipif(not BARN.exists(), reason="needs BARN's worlds (docs/how-to/data.md)")
-@pytest.mark.parametrize("cell", [0.15, 0.05])
-def test_barn_in_the_best_corridor_is_the_optimum(cell):
-    """With 0.363 m of clearance: the Jackal's radius plus 3 cm."""
-    gaps = []
-    for task in barn():
-        grid = rasterise(task.world, cell, 0.363)
-        plan = AStar().plan(Query.between(grid, task), RNG)
-        assert plan.solved
-        line = smooth(plan, grid, task, kind="none")
-        for kind in SMOOTHED:
-            route = smooth(plan, grid, task, kind=kind)
-            check(route, line, task, 0.363)
-            assert (route.kind, route.note) == (kind, "")
-            if kind == "clearance":
-                continue
-            best = shortest(task.world.discs, task.world.bounds, 0.363, task.start[:2], task.goal)
-            gap = route.length / best.length - 1
-            same = word(route.xy, task.world.discs[:, :2]) == word(sampled(best), task.world.discs[:, :2])
-            assert gap <= (1.5e-4 if same else 0.02)
-            gaps.append((gap, same))
-    assert sum(same for _, same in gaps) >= 0.9 * len(gaps)
-
-
 # -- lines that cannot be smoothed, and misuse
 
 
@@ -394,15 +326,6 @@ def test_spare_length_is_spent_only_once():
     assert route.length <= cost + 1e-9
 
 
-def test_without_room_for_more_clearance_the_line_stays_taut():
-    """A taut plan has no spare length for more clearance."""
-    task, grid, plan = one_disc(1)
-    taut = smooth(plan, grid, task)
-    again = PlanResult(status=PlanStatus.SOLVED, waypoints=grid.fractional(taut.xy))
-    route = smooth(again, grid, task, kind="clearance")
-    assert route.length <= taut.length + 1e-9
-
-
 def test_none_is_the_plans_own_line_and_misuse_is_refused():
     task, grid, plan = one_disc(1)
     route = smooth(plan, grid, task, kind="none")
@@ -429,18 +352,13 @@ def test_a_routes_curvature_follows_its_points():
 
 
 def test_a_forest_of_400_discs_is_smoothed():
-    import time
-
     task = forest(
         np.random.default_rng(1), size=40, count=400, radius=(0.3, 0.7), clearance=1, spacing=0.1, robot_radius=0.25
     )
     grid = rasterise(task.world, 0.25, 0.3)
     plan = AStar().plan(Query.between(grid, task), RNG)
+    line = smooth(plan, grid, task, kind="none")
     for kind in SMOOTHED:
-        smooth(plan, grid, task, kind=kind)
-        spent = []
-        for _ in range(3):
-            started = time.process_time()
-            smooth(plan, grid, task, kind=kind)
-            spent.append(time.process_time() - started)
-        assert min(spent) < 2, "an algorithm of a higher order would take longer on any machine"
+        route = smooth(plan, grid, task, kind=kind)
+        check(route, line, task, grid.inflate, longest=plan.cost)
+        assert route.kind == kind

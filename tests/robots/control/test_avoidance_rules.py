@@ -23,6 +23,7 @@ from antdrive.robots.control._kernels_avoidance import first_contact, intrusion,
 from antdrive.robots.control._kernels_lines import CHECKED
 from antdrive.robots.control.avoidance import _weights
 from antdrive.worlds import Disc, Route, World
+from tests.robots.control.kinematics import avoiding
 
 OPEN = World("open", (-20, -20, 20, 20))
 NEAR = np.array([0])
@@ -239,20 +240,17 @@ def passes(walls, mover, speed, hz=20):
     robot, route = load_robot("warehouse"), Route(np.array([(1.0, 0.0), (7.0, 0.0)]))
     tracked = PurePursuit().prepare(route, World("passage", (-9, -3, 15, 3), walls), robot, 0.03, 1 / hz)
     avoidance = Avoidance()
-    pose, last, pursuit, state = np.array([1.0, 0.0, 0.0]), Twist(0.0, 0.0), PursuitState(), AvoidanceState()
-    for k in range(20 * hz):
+
+    def movers(k):
         x = mover[0] - speed * (k / hz + avoidance.prediction_times)
-        places, here = np.stack([x, np.full(len(x), mover[1])], axis=1)[:, None], tuple(pose)
-        wanted, after = PurePursuit().step(tracked, here, last, pursuit)
-        last, _, state = avoidance.avoid(
-            tracked, robot, here, last, pursuit, wanted, state, places, np.array([0.1])
-        )  # fmt: skip
-        pursuit = after
-        pose += np.array((last.speed * math.cos(pose[2]), last.speed * math.sin(pose[2]), last.yaw_rate)) / hz
-        world = World("with the mover", (-9, -3, 15, 3), (*walls, Disc(*places[0, 0].tolist(), 0.1)))
-        if footprint_clearance(world, robot.footprint, pose[None])[0] <= 0:
+        return np.stack([x, np.full(len(x), mover[1])], axis=1)[:, None], None
+
+    poses = list(avoiding(tracked, robot, avoidance, movers, 0.1, start=(1.0, 0.0, 0.0), hz=hz, seconds=20))
+    for k, pose in enumerate(poses):
+        world = World("with the mover", (-9, -3, 15, 3), (*walls, Disc(*movers(k)[0][0, 0].tolist(), 0.1)))
+        if footprint_clearance(world, robot.footprint, [pose])[0] <= 0:
             return False
-    return bool(pose[0] > 6.0)
+    return poses[-1][0] > 6.0
 
 
 def rows(y):

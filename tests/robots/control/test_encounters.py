@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, load_robot
+from antdrive.robots import Avoidance, PurePursuit, load_robot
 from antdrive.worlds import Route, World
+from tests.robots.control.kinematics import avoiding
 
 HZ = 60
 JACKAL = load_robot("jackal")
@@ -21,23 +22,19 @@ TRACKED = PurePursuit().prepare(ROUTE, World("open", (-30, -30, 50, 30)), JACKAL
 
 def least_gap(robot, avoidance, mover, velocity, radius, *, known, turn=(math.inf, 0.0)):
     """The least gap between the robot's circle and a mover that turns once by an angle, by kinematics [m]."""
-    pose, last, pursuit, state = np.zeros(3), Twist(robot.max_speed, 0.0), PursuitState(), AvoidanceState()
-    place, velocity, least = np.array(mover), np.array(velocity), math.inf
     (when, by), ahead = turn, avoidance.prediction_times[:, None, None]
-    for tick in range(8 * HZ):
-        if tick == round(min(when, 100.0) * HZ):
-            velocity = np.array([(math.cos(by), -math.sin(by)), (math.sin(by), math.cos(by))]) @ velocity
-        places = np.ascontiguousarray(place + ahead * (velocity if known else 0.0 * velocity))
-        wanted, after = PurePursuit().step(TRACKED, tuple(pose), last, pursuit)
-        command, avoids, state = avoidance.avoid(
-            TRACKED, robot, tuple(pose), last, pursuit, wanted, state, places, np.array([radius]), velocity[None]
-        )
-        pursuit = after._replace(turning=pursuit.turning) if avoids else after
-        middle = pose[2] + 0.5 * command.yaw_rate / HZ
-        pose += np.array((command.speed * math.cos(middle), command.speed * math.sin(middle), command.yaw_rate)) / HZ
-        place, last = place + velocity / HZ, command
-        least = min(least, math.dist(place, pose[:2]) - radius - robot.radius)
-    return least
+    turned = np.array([(math.cos(by), -math.sin(by)), (math.sin(by), math.cos(by))]) @ velocity
+    kept = min(when, 8.0)
+
+    def place(t):
+        return np.add(mover, min(t, kept) * np.array(velocity) + max(t - kept, 0.0) * turned)
+
+    def movers(k):
+        now = turned if k >= kept * HZ else np.array(velocity)
+        return place(k / HZ) + ahead * (now if known else 0.0 * now), now[None]
+
+    poses = avoiding(TRACKED, robot, avoidance, movers, radius, start=np.zeros(3), speed=robot.max_speed, seconds=8)
+    return min(math.dist(place((k + 1) / HZ), pose[:2]) - radius - robot.radius for k, pose in enumerate(poses))
 
 
 @pytest.mark.slow

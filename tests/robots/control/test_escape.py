@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, load_robot
+from antdrive.robots import Avoidance, PurePursuit, load_robot
 from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.worlds import Route, World
+from tests.robots.control.kinematics import avoiding
 
 JACKAL, RADIUS, HZ = load_robot("jackal"), 0.5, 60
 LENGTH, WIDTH = 0.508, 0.430
@@ -38,34 +39,20 @@ def least_gap(tracked, speed, bearing, gap, mover_speed):
 
     The robot drives along the route. The mover's surface is `gap` from its circumscribed circle, at a bearing.
     """
-    avoidance, state = Avoidance(), AvoidanceState()
-    pose, last, pursuit = (0.0, 0.0, 0.0), Twist(speed, 0.0), PursuitState(15.0)
-    reach = gap + RADIUS + JACKAL.radius
-    mover = reach * np.array([math.cos(bearing), math.sin(bearing)])
+    avoidance, reach = Avoidance(), gap + RADIUS + JACKAL.radius
+    start = reach * np.array([math.cos(bearing), math.sin(bearing)])
     # It meets a robot that does not react: across the line of sight both move alike.
-    sight, across = mover / reach, np.array([-math.sin(bearing), math.cos(bearing)])
+    sight, across = start / reach, np.array([-math.sin(bearing), math.cos(bearing)])
     alike = -speed * math.sin(bearing)
     velocity = alike * across - math.sqrt(max(mover_speed**2 - alike**2, 0.0)) * sight
-    least = math.inf
-    for _ in range(2 * HZ):
-        places = (mover + avoidance.prediction_times[:, None] * velocity)[:, None]
-        before = pursuit
-        wanted, pursuit = PurePursuit().step(tracked, pose, last, before)
-        last, _, state = avoidance.avoid(
-            tracked, JACKAL, pose, last, before, wanted, state, np.ascontiguousarray(places), np.array([RADIUS])
-        )
-        x, y, yaw = pose
-        middle = yaw + 0.5 * last.yaw_rate / HZ
-        pose = (
-            x + last.speed * math.cos(middle) / HZ,
-            y + last.speed * math.sin(middle) / HZ,
-            yaw + last.yaw_rate / HZ,
-        )
-        mover = mover + velocity / HZ
-        least = min(least, gap_to(pose, mover))
-        if least < -0.2:
-            break
-    return least
+
+    def movers(k):
+        return (start + (k / HZ + avoidance.prediction_times[:, None]) * velocity)[:, None], None
+
+    poses = avoiding(
+        tracked, JACKAL, avoidance, movers, RADIUS, start=(0.0, 0.0, 0.0), speed=speed, arc=15.0, seconds=2
+    )
+    return min(gap_to(pose, start + (k + 1) / HZ * velocity) for k, pose in enumerate(poses))
 
 
 @settings(max_examples=25, deadline=None)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex, index_discs, nearby
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, index_discs
 from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import full_braking, pursue, stopping_clearance, turn_in
 from antdrive.robots.control.pursuit import obstacles_around
@@ -50,20 +50,6 @@ def test_between_two_samples_the_shorter_lookahead_counts():
         obstacles = ObstacleIndex(*index_discs(NO_DISCS, WIDE, 10.0, 1.0), WIDE, WIDE[:2], 10.0)
         v, w, *_ = pursue(1.01, 0.02, 0.0, 0.5, 0.0, 0.9, False, path, obstacles, LIMITS, TUNING)
         assert w / v == pytest.approx(-2 * 0.02 / 0.2**2, rel=1e-6)
-
-
-def test_the_discs_near_a_place_are_all_those_that_come_within_the_distance():
-    rng = np.random.default_rng(4)
-    bounds = np.array([-3.0, 2.0, 5.0, 8.0])
-    discs = rng.uniform((-3, 2, 0.01), (5, 8, 1.5), (40, 3))
-    for side, distance in ((0.5, 0.3), (1.0, 1.0), (7.0, 0.0)):
-        obstacles = ObstacleIndex(*index_discs(discs, bounds, side, distance), bounds, bounds[:2], side)
-        for x, y in rng.uniform((-4, 1), (6, 9), (50, 2)):
-            here = {tuple(row) for row in nearby(x, y, math.inf, obstacles).tolist()}
-            inside = np.clip((x, y), bounds[:2], bounds[2:])
-            gap = np.hypot(*(discs[:, :2] - inside).T) - discs[:, 2]
-            assert {tuple(row) for row in discs[gap <= distance].tolist()} <= here
-            assert all(gap[k] <= distance + side * math.sqrt(2) for k in range(40) if tuple(discs[k].tolist()) in here)
 
 
 def room_to_stop(v, w, disc):

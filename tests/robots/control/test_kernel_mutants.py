@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from antdrive.robots import Footprint, PurePursuit, footprint_clearance
+from antdrive.robots import PurePursuit
 from antdrive.robots.control._kernels_avoidance import AvoidanceWeights, Encounter, among_movers, progress_by_distance
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, index_discs
 from antdrive.robots.control._kernels_path import PathSamples, clear_lookaheads, project
-from antdrive.robots.control._kernels_pursuit import rotation, slow_for_curvature
-from antdrive.worlds import Disc, Route, World
+from antdrive.robots.control._kernels_pursuit import rotation
+from antdrive.worlds import Route, World
 from tests.robots.control.profiles import profile
 from tests.robots.control.test_rules import LIMITS, TUNING
 
@@ -60,27 +60,6 @@ def test_lookaheads_end_where_the_line_to_the_carrot_would_come_too_close():
         assert length == pytest.approx(expected), i * spacing
 
 
-def test_an_arc_is_as_far_from_large_discs_as_its_points_are():
-    rng = np.random.default_rng(8)
-    for _ in range(60):
-        curvature, sweep = rng.uniform(0.2, 2.0) * rng.choice([-1, 1]), rng.uniform(0.05, 3.0)
-        sweep = math.copysign(sweep, curvature)
-        x, y, yaw = rng.uniform((-1, -1, -3), (1, 1, 3))
-        turned = yaw + np.linspace(0, sweep, 4001)
-        xs = x + (np.sin(turned) - math.sin(yaw)) / curvature
-        ys = y - (np.cos(turned) - math.cos(yaw)) / curvature
-        discs = rng.uniform((-6, -6, 0.05), (6, 6, 3.0), (3, 3))
-        expected = min((np.hypot(xs - d[0], ys - d[1]) - d[2]).min() for d in discs)
-        found = arc_clearance(x, y, yaw, curvature, sweep, xs[-1], ys[-1], discs, WIDE, math.inf)
-        assert found == pytest.approx(expected, abs=1e-5)
-
-
-def test_a_route_is_as_long_as_its_segments(turtlebot):
-    world = World("open", (-5.0, -5.0, 5.0, 5.0))
-    tracked = PurePursuit().prepare(Route(STRAIGHT), world, turtlebot, 0.1, 1 / 60)
-    assert tracked.length == pytest.approx(3.0)
-
-
 def test_lookaheads_and_braking_keep_their_fractions_of_the_margin(turtlebot):
     world = World("open", (-5.0, -5.0, 5.0, 5.0))
     controller = PurePursuit(lookahead_margin=0.7, stopping_margin=0.4)
@@ -118,19 +97,6 @@ def test_progress_is_at_most_the_travel_in_the_routes_direction(turn):
         off = progress_by_distance(along * cos, along * sin, turn + 0.4, 1.0, 1.5, path, 2.0, found)
         np.testing.assert_allclose(found, np.clip(along + np.linspace(0, 2, 5), 1.0, 2.5), atol=1e-9)
         assert off == pytest.approx(0.4)
-
-
-def test_a_centre_within_a_rectangle_is_as_deep_as_its_nearest_side():
-    foot = Footprint.rectangle(1.0, 0.6)
-    for dx, dy, depth in ((0.0, 0.0, 0.3), (0.4, 0.1, 0.1), (-0.1, -0.25, 0.05)):
-        world = World("w", (-50.0, -50.0, 50.0, 50.0), (Disc(dx, dy, 0.1),))
-        assert footprint_clearance(world, foot, [(0.0, 0.0, 0.0)])[0] == pytest.approx(-depth - 0.1)
-
-
-def test_a_bend_to_the_right_slows_like_one_to_the_left():
-    for lateral, yaw_rate, speed in ((1.0, 9.0, 0.5**0.5), (9.0, 1.0, 0.5)):
-        assert slow_for_curvature(2.0, lateral, yaw_rate) == pytest.approx(speed)
-        assert slow_for_curvature(-2.0, lateral, yaw_rate) == pytest.approx(speed)
 
 
 def test_before_it_rotates_a_robot_brakes_on_its_curve():

@@ -92,8 +92,9 @@ def test_the_catalogues_robots_turn_in_with_both_speeds_scaled_together(name, sh
 
 
 def test_speed_in_curves_is_limited_by_lateral_acceleration_and_yaw_rate():
-    assert slow_for_curvature(0.5, 2.0, 4.0) == pytest.approx(2.0)  # v^2 * 0.5 = 2
-    assert slow_for_curvature(8.0, 9.0, 4.0) == pytest.approx(0.5)  # 8 v = 4 rad/s
+    for side in (1, -1):
+        assert slow_for_curvature(side * 0.5, 2.0, 4.0) == pytest.approx(2.0)  # v^2 * 0.5 = 2
+        assert slow_for_curvature(side * 8.0, 9.0, 4.0) == pytest.approx(0.5)  # 8 v = 4 rad/s
     assert slow_for_curvature(0.0, 2.0, 4.0) == math.inf
 
 
@@ -206,7 +207,7 @@ def sampled_arc(yaw, curvature, sweep):
     yaw=st.floats(-3.1, 3.1),
     curvature=st.floats(0.2, 5).flatmap(lambda c: st.sampled_from([c, -c])),
     angle=st.floats(0.01, 2.8),
-    disc=st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.05, 0.5)),
+    disc=st.tuples(st.floats(-6, 6), st.floats(-6, 6), st.floats(0.05, 3.0)),
 )
 def test_an_arcs_clearance_is_that_of_its_points(yaw, curvature, angle, disc):
     sweep = math.copysign(angle, curvature)

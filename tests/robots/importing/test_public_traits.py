@@ -35,6 +35,8 @@ def caster(name, x, y, kind="continuous", more=""):
 
 DIFFERENTIAL = {
     "casters that swivel": pair() + caster("left_caster", -0.2, 0.1) + caster("right_caster", -0.2, -0.1),
+    "casters that swivel half a turn": pair()
+    + caster("left_caster", -0.2, 0.1, "revolute", LIMIT.format('lower="-3.14159" upper="3.1416"')),
     "passive omni wheels in front": pair() + wheel("omni_left", 0.25, 0.22) + wheel("omni_right", 0.25, -0.22),
     "a suspension": '<link name="drop"/>'
     + joint("wheel_drop", "drop", "0 0 0", "prismatic", "0 0 1", more=LIMIT.format('upper="0.03"'))

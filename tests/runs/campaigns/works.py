@@ -6,7 +6,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from antdrive.base.errors import InputError
 from antdrive.runs.campaigns.rows import failed_row
 from antdrive.runs.campaigns.running import Finished
 
@@ -30,19 +29,6 @@ class Deadly:
 
 
 @dataclass(frozen=True)
-class Listing:
-    """Every run adds a line to a file: the world that its process is in."""
-
-    path: str
-
-    def __call__(self, job):
-        time.sleep(0.01)
-        with Path(self.path).open("a") as stream:
-            stream.write(f"{os.getpid()} {job.case.place.world}\n")
-        return Finished(failed_row(job.key, "succeeded", ""))
-
-
-@dataclass(frozen=True)
 class Endless:
     """A run whose seed is among `seeds` does not end."""
 
@@ -51,14 +37,4 @@ class Endless:
     def __call__(self, job):
         while job.seed in self.seeds:
             time.sleep(0.1)
-        return Finished(failed_row(job.key, "succeeded", f"seed {job.seed}"))
-
-
-@dataclass(frozen=True)
-class Refusing:
-    """A run whose seed is 3 finds that the campaign cannot go on."""
-
-    def __call__(self, job):
-        if job.seed == 3:
-            raise InputError("rollouts/ab.npz: cannot be written (No space left on device)")
         return Finished(failed_row(job.key, "succeeded", f"seed {job.seed}"))

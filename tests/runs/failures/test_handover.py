@@ -9,7 +9,6 @@ from antdrive.planners import load_planner
 from antdrive.robots import Avoidance, PurePursuit, load_robot
 from antdrive.runs.failures.failure import Attempt
 from antdrive.runs.failures.handover import (
-    Handover,
     _robot,
     expectation,
     renamed,
@@ -23,12 +22,12 @@ from antdrive.runs.suites.suite import load_suite
 from antdrive.sim import Certificate, Perception, ReplanPolicy, Scenario
 from antdrive.sim.log.record import MarginRecord
 from antdrive.sim.scenario import MarginChoice
-from antdrive.testing.evaluation import check_case
+from antdrive.testing.evaluation import evaluate_case
 from antdrive.worlds import Disc
 
 
-def handed(name, done, **more):
-    return Handover(name, Attempt(done.scenario, done), **more)
+def handed(name, done):
+    return Attempt(renamed(done.scenario, name), done)
 
 
 SCENARIOS = {
@@ -54,7 +53,9 @@ def test_the_suite_gives_the_same_scenario(small_run, tmp_path, name):
         scenario = replace(Scenario.of("plaza-moving", "dstar-lite"), **MOVERS[name])
     suite = write_suite(tmp_path / "s.drive.yaml", [handed(name, replace(small_run, scenario=scenario))])
     (case,) = load_suite(suite)
-    assert scenario_of(case) == replace(scenario, margin=scenario.planned_margin), "the suite survives other defaults"
+    assert scenario_of(case) == replace(renamed(scenario, name), margin=scenario.planned_margin), (
+        "the suite survives other defaults"
+    )
 
 
 @pytest.mark.parametrize("shape", ["disc", "rectangle"])
@@ -76,15 +77,15 @@ def test_two_robots_of_one_name_have_files_of_their_own(small_run, tmp_path):
 
 
 def test_the_suite_holds_as_long_as_the_failure_repeats(collided_run, tmp_path):
-    suite = write_suite(tmp_path / "s.drive.yaml", [handed("hit", collided_run, note="as it was")])
+    suite = write_suite(tmp_path / "s.drive.yaml", [handed("hit", collided_run)], ["as it was"])
     (case,) = load_suite(suite)
-    assert check_case(case).faults == ()
+    assert evaluate_case(case).faults == ()
     assert case.entry.expect == {"outcome": "collided", "touched": "unseen cylinder"}
     mended = yaml.safe_load(suite.read_text())
     del mended["scenarios"]["hit"]["unseen"]
     suite.write_text(yaml.safe_dump(mended))
     (case,) = load_suite(suite)
-    result = check_case(case)
+    result = evaluate_case(case)
     assert result.faults == ("outcome: succeeded, expected collided",), "and nothing about a missing baseline"
 
 
@@ -94,7 +95,7 @@ def test_a_chosen_margin_is_handed_over_as_a_number(small_scenario, tmp_path):
     auto = replace(small_scenario, margin=0.04, margin_choice=choice)
     assert auto.chosen == choice
     done = Attempt.of(renamed(auto, "auto"))
-    assert run_elsewhere(write_suite(tmp_path / "s.drive.yaml", [Handover("auto", done)])) == [done.fingerprint]
+    assert run_elsewhere(write_suite(tmp_path / "s.drive.yaml", [done])) == [done.fingerprint]
 
 
 def test_what_is_expected_of_a_success_that_fails_otherwise(small_run):
@@ -111,7 +112,7 @@ def test_what_was_written_is_what_another_process_runs(small_run, tmp_path):
     world.write_text(world.read_text().replace("radius: 0.3", "radius: 0.31"))
     (tmp_path / "worlds" / "three.yaml").unlink()
     one, two, three = run_elsewhere(suite)
-    assert one == Attempt(small_run.scenario, small_run).fingerprint != two
+    assert one == Attempt.of(renamed(small_run.scenario, "one")).fingerprint != two
     assert "scenarios.three.world: worlds/three.yaml: no such file" in three
 
 

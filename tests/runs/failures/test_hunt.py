@@ -20,13 +20,13 @@ from antdrive.runs.failures.hunt import (
     POINTS,
     REHEARSED,
     Hunt,
-    WorldSpace,
     driven_line,
     find_failures,
     guided_world,
     is_new,
     line_distance,
     rehearsed_clearance,
+    world_of,
 )
 from antdrive.runs.failures.reproducers import write_reproducers
 from antdrive.runs.failures.shrinker import shrink
@@ -213,12 +213,10 @@ def test_no_path_counts_only_where_the_grid_has_no_excuse(small_scenario):
     assert hunting._failure(Attempt(wide.scenario, wide)) is not None
 
 
-@given(st.integers(1, 8), st.floats(0.02, 2.0), st.data())
-def test_every_point_is_a_world_in_which_both_ends_are_free(count, radius, data):
-    space = WorldSpace(count, radius)
-    point = np.array(data.draw(st.lists(st.floats(0, 1), min_size=3 * count, max_size=3 * count)))
-    task = space.task(point, "w")
-    assert len(task.world.obstacles) == count
+@given(st.floats(0.02, 2.0), st.lists(st.tuples(*[st.floats(0, 1)] * 3), min_size=1, max_size=8))
+def test_every_point_is_a_world_in_which_both_ends_are_free(radius, point):
+    task = world_of(np.array(point), radius, "w")
+    assert len(task.world.obstacles) == len(point)
     for x, y in (task.start[:2], task.goal):
         assert min(np.hypot(disc.x - x, disc.y - y) - disc.radius for disc in task.world.obstacles) > radius
         assert min(x, y, task.world.size[0] - x, task.world.size[1] - y) > radius
@@ -226,9 +224,9 @@ def test_every_point_is_a_world_in_which_both_ends_are_free(count, radius, data)
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_a_rehearsal_foretells_the_clearance_of_the_drive(careless, noise):
-    space, rng = WorldSpace(4, careless.robot.radius), np.random.default_rng(1)
+    rng = np.random.default_rng(1)
     for seed in range(4):
-        task = space.task(rng.random(space.dimensions), "w")
+        task = world_of(rng.random((4, 3)), careless.robot.radius, "w")
         scenario = replace(careless, task=task, noise=noise, seed=seed)
         done = run(scenario)
         if done.rollout is not None:

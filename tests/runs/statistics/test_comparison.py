@@ -11,7 +11,7 @@ from antdrive.base import FieldError
 from antdrive.runs.statistics.comparison import _needed, compare_metric, compare_success, not_worse, pairs_of
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.price import prices
-from antdrive.runs.statistics.run_table import PLACE, SETTINGS, RunTable, described, matching, merged
+from antdrive.runs.statistics.run_table import CONFIGURATION, PLACE, RunTable, described, matching, merged
 from antdrive.runs.statistics.success import common_medians, success_table
 from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
 
@@ -95,7 +95,7 @@ def test_runs_without_a_partner_are_counted_and_left_out():
     assert metric.pairs + metric.dropped == 12
 
 
-@pytest.mark.parametrize("key", ["world", "world_hash", "task", "seed", *SETTINGS])
+@pytest.mark.parametrize("key", ["world", "world_hash", "task", "seed", *CONFIGURATION])
 def test_runs_that_differ_in_anything_are_no_pairs(key):
     columns = made_up_columns({"a": Skill(), "b": Skill()}, worlds=2, seeds=2)
     columns[key] = [
@@ -352,7 +352,7 @@ def test_every_column_that_describes_a_run_is_paired_by():
     from antdrive.runs.campaigns.rows import GRID
 
     names = {"key", "planner", "planner_name", "planner_version", "options", "seed", "command", "area_m2"}
-    assert set(GRID) - names <= {*PLACE, *SETTINGS}
+    assert set(GRID) - names <= {*PLACE, *CONFIGURATION}
 
 
 def campaign(*planners, rng_seed=1, **words):

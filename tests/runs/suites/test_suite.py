@@ -18,7 +18,7 @@ from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.suites import Baseline, load_suite, scenario_of, select
 from antdrive.runs.suites.scenarios import run_command
 from antdrive.runs.suites.suite import ScenarioEntry
-from antdrive.testing import check_case
+from antdrive.testing import evaluate_case
 
 PLAIN = """schema: 1
 scenarios:
@@ -110,13 +110,13 @@ def test_a_margin_is_chosen_once_and_named_by_the_baseline(tmp_path, monkeypatch
     chosen = []
     monkeypatch.setattr("antdrive.runs.margins.choice.choose_margin", choose)
     case = only(tmp_path, "world: empty, planner: astar, noise: 0.5, smoothing: taut, margin: auto")
-    assert check_case(case, update="new").accepted == "written"
+    assert evaluate_case(case, update="new").accepted == "written"
     assert (chosen[0].noise, chosen[0].smoothing) == (0.5, "taut")
     written = json.loads(case.baseline_path.read_text())
     assert written["margin_m"] == 0.021
     baseline = Baseline.load(case.baseline_path)
     assert baseline.to_text() == case.baseline_path.read_text()
-    again = check_case(
+    again = evaluate_case(
         only(tmp_path, "world: empty, planner: astar, noise: 0.5, margin: auto, expect: {duration_s: '< 1'}")
     )
     assert "margin: auto chose 0.034 m, for the baseline 0.021 m" in again.details
@@ -262,16 +262,19 @@ def test_words_select_tests(tmp_path):
         tmp_path / "below", "schema: 1\ndefaults: {world: empty, seeds: 0-1}\nscenarios: {a: {}, ab: {}, c: {}}\n"
     )
 
+    wrong = suite(tmp_path, "schema: 1\nscenarios: {a: {world: empty, controller: {brake: 1}}}\n", "wrong.drive.yaml")
+
     def ids(*words, pattern=None):
         return [case.id for case in select(words, pattern)]
 
-    assert ids(str(tmp_path)) == ["a[0]", "a[1]", "ab[0]", "ab[1]", "c[0]", "c[1]"]
+    assert ids(str(path.parent)) == ["a[0]", "a[1]", "ab[0]", "ab[1]", "c[0]", "c[1]"]
     assert ids(f"{path}::a") == ["a[0]", "a[1]"]
     assert ids(f"{path}::c[1]", str(path), pattern="c") == ["c[1]", "c[0]"]
     assert ids(str(path), pattern="a*") == ["a[0]", "a[1]", "ab[0]", "ab[1]"]
     for words, pattern, message in (
         ([f"{path}::d"], None, "no test 'd'; choose from"),
         ([str(path)], "x*", "no test of"),
+        ([str(wrong)], None, "scenarios.a.controller.brake: unknown setting; did you mean braking"),
         ([str(tmp_path / "none.drive.yaml")], None, "no such file"),
         ([__file__], None, "not a suite; its name must end in .drive.yaml"),
         ([str(Path(__file__).parent)], None, "contains no suites"),

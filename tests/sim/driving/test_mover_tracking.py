@@ -15,7 +15,6 @@ from antdrive.sim import Outcome, Perception, Rollout, Scenario, run
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.perceived_movers import Tracked
-from antdrive.sim.driving.replay import replay
 from antdrive.sim.driving.rules import SlowAtCorners
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.metrics import measure
@@ -195,32 +194,10 @@ def test_the_scans_of_a_robot_with_a_map_are_in_its_log(log, jackal):
     assert {sight.obstacle for sight in passed(log) if sight.mover} == {0}
 
 
-def test_replays_take_the_scans_of_a_robot_with_a_map_again(log):
-    assert replay(log).problems == ()
-    scans = log.scans.copy()
-    scans[40, 300] += 1
-    (problem,) = replay(replace(log, scans=scans)).problems
-    assert problem == (
-        f"replay: scans differ from the lidar at the logged poses, from t = {log.t[log.scan_rows[40]]:.3f} s"
-    )
-    fewer = replace(log, scans=np.delete(log.scans, 40, axis=0), scan_rows=np.delete(log.scan_rows, 40))
-    assert replay(fewer).problems == (problem,)
-    row = (log.scan_rows[40] + log.scan_rows[41]) // 2
-    invented = np.insert(log.scans, 41, log.scans[40], axis=0), np.insert(log.scan_rows, 41, row)
-    (problem,) = replay(replace(log, scans=invented[0], scan_rows=invented[1])).problems
-    assert f"from t = {log.t[row]:.3f} s" in problem
-    none = replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])  # as older logs are
-    assert replay(none).problems == ()
+def test_only_a_robot_with_a_lidar_in_use_logs_scans(log):
     told = replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))
     forged = replace(log, record=told, tracks=log.tracks[:0])
     assert "scans: must be empty, since the robot did not use its lidar" in certify(forged).problems
-
-
-def test_a_replay_draws_the_noise_of_scans_again(jackal):
-    noisy = run(scenario(jackal, noise=1.0, time_limit=0.7)).rollout
-    assert len(noisy.scans) > 30
-    assert replay(noisy).problems == ()
-    assert "scans" in replay(replace(noisy, scans=noisy.scans + np.uint16(2))).problems[0]
 
 
 #: A corridor along a room; a person in the room cannot be seen from it before the door.

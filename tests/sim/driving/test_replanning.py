@@ -483,7 +483,7 @@ def test_plans_for_a_footprint_are_repaired_and_as_short_as_those_from_scratch(p
     monkeypatch.setattr(
         "antdrive.sim.driving.route_planner.replanner_for", lambda *args: made.append(args) or replanner_for(*args)
     )
-    repaired.mapped = mapped
+    repaired.mapless = not mapped
     for turn, discs in enumerate(((), (Disc(4.0, 3.0, 0.45),), (Disc(4.0, 3.0, 0.45), Disc(5.0, 4.0, 0.3)), ())):
         known = len(POSTS) if mapped else 4 * turn
         hall = replace(HALL, obstacles=POSTS[:known])

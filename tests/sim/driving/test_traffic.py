@@ -24,7 +24,7 @@ from antdrive.sim.driving.movers_ahead import (
     Zone,
 )
 from antdrive.sim.driving.perceived_movers import Tracked
-from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED
+from antdrive.sim.policy import Trigger
 from antdrive.sim.sensing import TrackedMovers
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, import_dynabarn, rasterise
 from tests.records import COARSE, changed
@@ -295,7 +295,11 @@ def test_without_tracks_nothing_changes(jackal, hits, x, y, yaw):
 
 def test_a_mover_on_its_way_onto_the_route_makes_a_new_one_due(jackal):
     movers, tracking = ahead(jackal)
-    for start, trigger in (((3.0, 7.5), OBSTRUCTED), ((3.0, 9.0), ""), ((8.0, 7.5), "")):  # here, too late, too far
+    for start, trigger in (
+        ((3.0, 7.5), Trigger.OBSTRUCTED),
+        ((3.0, 9.0), ""),
+        ((8.0, 7.5), ""),
+    ):  # here, too late, too far
         tracking.see([(*start, 0.0, -1.0)])
         movers.observe(tracking.tick, POSE, False)
         assert movers.trigger(tracking.tick, POSE, straight(jackal), 0.0) == trigger, start
@@ -307,12 +311,12 @@ def test_a_long_wait_triggers_a_replan(jackal):
     for tick in range(200):
         movers.observe(tick, POSE, tick >= 10)
         due.append(movers.trigger(tick, POSE, straight(jackal), 0.0))
-    assert due.index(WAITED) == pytest.approx(10 + 2 * 60, abs=1)
-    assert due.count(WAITED) == 1
+    assert due.index(Trigger.WAITED) == pytest.approx(10 + 2 * 60, abs=1)
+    assert due.count(Trigger.WAITED) == 1
 
 
 def test_a_route_through_busy_ground_is_due_for_a_new_one_and_one_along_the_wall_is_not(jackal):
-    for speed, y, trigger in ((1.8, 6.0, TRAFFIC), (1.8, 0.6, ""), (1.2, 6.0, "")):
+    for speed, y, trigger in ((1.8, 6.0, Trigger.TRAFFIC), (1.8, 0.6, ""), (1.2, 6.0, "")):
         movers, tracking = ahead(jackal, max_traffic=0.07)
         busy(movers, tracking, speed)
         tracking.see([])  # where they are is no matter, but where they have been
@@ -429,4 +433,4 @@ def test_a_robot_that_has_waited_replans_again():
     for tick in range(360):
         movers.observe(tick, POSE, True)
         due.append(movers.trigger(tick, POSE, None, 0.0))
-    assert [each for each in due if each] == [OBSTRUCTED] * 3 + [WAITED] * 2
+    assert [each for each in due if each] == [Trigger.OBSTRUCTED] * 3 + [Trigger.WAITED] * 2

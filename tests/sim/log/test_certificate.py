@@ -14,7 +14,8 @@ from antdrive.robots import footprint_clearance
 from antdrive.sim import Outcome, Rollout, certify
 from antdrive.sim.log import certificate
 from antdrive.sim.log.certificate import closed_form_clearance, in_metres
-from antdrive.sim.log.record import DECISION, PerceptionRecord, ReplanRecord
+from antdrive.sim.log.record import PerceptionRecord, ReplanRecord
+from antdrive.sim.policy import Trigger
 from antdrive.worlds import Cruising, Disc
 from tests.records import changed
 from tests.sim.log.test_certificate_faults import drive, says, with_record
@@ -173,5 +174,5 @@ def test_times_that_are_not_those_of_the_rows_are_named_and_nothing_else_fails(o
 
 
 def test_a_replan_long_after_the_drive_is_named():
-    for trigger in ("waited", DECISION):
+    for trigger in ("waited", Trigger.DECISION):
         assert says(among_movers(PLAIN, replace(REPLAN, t=1e300, trigger=trigger)), "after the end")

@@ -22,13 +22,13 @@ from antdrive.sim.log.certificate import Certificate, closed_form_clearance
 from antdrive.sim.log.consistency import POINT_SPACING, _spaced
 from antdrive.sim.log.metrics import driven_length_m
 from antdrive.sim.log.record import (
-    DECISION,
     ComponentRecord,
     MarginRecord,
     PerceptionRecord,
     ReplanRecord,
     SensingRecord,
 )
+from antdrive.sim.policy import Trigger
 from antdrive.sim.recording import optima_of
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, World
 from antdrive.worlds.route import end_reach
@@ -553,7 +553,9 @@ def test_the_lead_of_a_footprint_keeps_the_room_of_the_start_pose():
 def test_a_route_of_decisions_leads_to_the_goal_too():
     """The log has the route of the whole plan, which the first decision replaces."""
     short = replace(drive(), route=np.array([(1.0, 1.0), (1.25, 1.0)]))
-    step = ReplanRecord(t=1.0, trigger=DECISION, solved=True, cost_m=1.0, work=1, route=((1.0, 1.0), (5.0, 1.0)))
+    step = ReplanRecord(
+        t=1.0, trigger=Trigger.DECISION, solved=True, cost_m=1.0, work=1, route=((1.0, 1.0), (5.0, 1.0))
+    )
     assert says(with_record(short, replans=(step,)), "route: ends")
 
 
@@ -958,7 +960,9 @@ def test_replans_lead_to_the_goal():
 
 
 def test_only_planners_that_decide_cell_by_cell_make_decisions():
-    step = ReplanRecord(t=2.0, trigger=DECISION, solved=True, cost_m=1.0, work=1, route=((1.2, 1.0), (2.0, 1.0)))
+    step = ReplanRecord(
+        t=2.0, trigger=Trigger.DECISION, solved=True, cost_m=1.0, work=1, route=((1.2, 1.0), (2.0, 1.0))
+    )
     for name, refused in (("astar", True), ("mmas-dstar", False)):
         log = with_record(drive(0.1), replans=(step,), replanning={}, planner=ComponentRecord(name=name, settings={}))
         assert bool(says(log, "record.replans[0].trigger: decision")) is refused

@@ -8,13 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive import load_robot
 from antdrive.robots import footprint_clearance
 from antdrive.sim import Engine
 from antdrive.sim.log.certificate import SKID, SPINNING
 from antdrive.sim.physics.bullet import bullet, client
 from antdrive.worlds import Disc, World
-from benchmarks.physics import Pass, drive_on, drive_past
 
 OPEN = World("open", (-10, -10, 10, 10))
 
@@ -222,26 +220,6 @@ def test_a_client_whose_world_failed_is_not_kept(turtlebot):
         raise KeyError
     assert taken == number
     assert not bullet().isConnected(number)
-
-
-@pytest.mark.parametrize("clearance", [-0.005, 0.002, 0.02])
-def test_a_pass_is_evaluated_by_where_the_robot_drove(clearance):
-    """At 60 Hz the turtlebot leaves its line by 9 mm on the way to the cylinder, so that 2 mm of clearance are an overlap."""
-    robot = load_robot("turtlebot")
-    radius, speed = robot.footprint.bounds[3], robot.max_speed / 2
-    poses = drive_on(robot, 60, speed)
-    found = drive_past(robot, 60, speed, clearance, poses)
-    away = min(math.hypot(3.0 - x, radius + clearance + 0.3 - y) for x, y, _ in poses)
-    assert found.overlap == pytest.approx(1e3 * (radius + 0.3 - away), abs=1e-6)
-    assert found.overlap + 1e3 * clearance == pytest.approx(9.5, abs=1.0)
-    assert found.felt == (clearance < 0.009)
-    assert (found.missed, found.false) == (False, False)
-
-
-def test_physics_and_the_closed_form_may_disagree_in_two_ways():
-    judged = {(felt, overlap): Pass(felt, overlap) for felt in (False, True) for overlap in (-1.0, 1.0)}
-    assert [case for case, found in judged.items() if found.missed] == [(False, 1.0)]
-    assert [case for case, found in judged.items() if found.false] == [(True, -1.0)]
 
 
 def test_a_control_period_has_the_bits_of_single_steps(spec):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from antdrive.robots import Footprint, Lidar
 from antdrive.sim.driving.simulated_lidar import start_ground
-from antdrive.sim.sensing import OccupancyMap, Scanner, clear_distance, clear_turn
+from antdrive.sim.sensing import OccupancyMap, Scanner, clear_way, shape_of
 from antdrive.sim.sensing._kernels_mapping import SQUARE, begins
 from antdrive.worlds import Disc, World
 
@@ -21,6 +21,14 @@ POSTS = np.array([[2.0, 0.4, 0.3], [1.0, -1.2, 0.2], [3.5, 1.5, 0.4]])
 def inside(points, discs):
     away = np.hypot(*(points[:, None, :] - discs[None, :, :2]).transpose(2, 0, 1))
     return np.any(away <= discs[:, 2], axis=1)
+
+
+def clear_distance(grid, pose, speed, yaw_rate, foot, limit, **more):
+    return clear_way(grid, pose, speed, yaw_rate, shape_of(foot), limit, **more)
+
+
+def clear_turn(grid, pose, yaw_rate, foot, limit, **more):
+    return clear_way(grid, pose, 0.0, yaw_rate, shape_of(foot), limit, **more)
 
 
 def cell_of(found, x, y):
@@ -336,7 +344,7 @@ def test_points_on_ground_that_was_free_are_not_explained_until_they_settle():
 def test_between_whole_scans_only_hits_are_entered(jackal):
     post, late = np.array([[2.0, 0.0, 0.2]]), np.array([[2.0, 0.0, 0.2], [1.0, 0.5, 0.1]])
     grid = OccupancyMap(jackal.lidar)
-    assert (grid.share, grid.turns) == (4, 2)
+    assert (grid.share, grid.stride) == (4, 2)
     for number in range(9):  # the second post comes between two whole scans
         scanner = Scanner(jackal.lidar, post if number < 2 else late)
         ranges = scanner.scan((0.0, 0.0, 0.0), rng=np.random.default_rng(number))
@@ -373,7 +381,7 @@ def test_every_beam_has_its_turn(jackal):
     """After two whole scans the ground is seen as after one of all beams."""
     scanner = Scanner(jackal.lidar, POSTS)
     grid, every = OccupancyMap(jackal.lidar), OccupancyMap(jackal.lidar)
-    every.turns = 1
+    every.stride = 1
     for number in range(13):
         pose = (0.5, 0.2, 0.3) if number else (0.0, 0.0, 0.0)
         for found in (grid, every):
@@ -511,11 +519,6 @@ def test_a_robot_may_leave_what_it_overlaps_but_not_come_nearer():
     beside = (0.3, -0.15, 0.0)  # drives along the cell
     assert clear_distance(grid, (0.35, -0.15, 0.0), 1.0, 0.0, ROUND, 1.0) == 1.0
     assert clear_distance(grid, beside, 1.0, 0.0, ROUND, 1.0) < 0.02
-
-
-def test_nothing_is_gained_by_standing():
-    assert clear_distance(seen([]), (0.0, 0.0, 0.0), 0.0, 1.0, BOX, 1.0) == 0.0
-    assert clear_distance(seen([]), (0.0, 0.0, 0.0), 0.0, 0.0, BOX, 1.0) == 1.0
 
 
 def test_footprints_off_the_axle_are_swept_as_they_are():

@@ -320,33 +320,3 @@ def test_the_layout_shows_topics_that_exist(folder, said):
         for name in path.split(".")[1:]:
             value = getattr(value, name)
     assert set(panels["3D!drive"]["topics"]) <= topics
-
-
-#: The keys of each panel's configuration, after the types in Foxglove's last open release and in Lichtblick.
-TITLES = {"foxglovePanelTitle", "lichtblickPanelTitle"}
-LINE = {"value", "label", "enabled", "timestampMethod", "color"}
-KEYS = {
-    "3D": {
-        "cameraState", "followMode", "followTf", "scene", "transforms", "topics", "layers", "publish", "imageMode",
-    },
-    "Plot": TITLES | {
-        "paths", "showLegend", "legendDisplay", "showPlotValuesInLegend", "showXAxisLabels", "showYAxisLabels", "isSynced",
-        "xAxisVal", "sidebarDimension",
-    },
-    "StateTransitions": TITLES | {"paths", "isSynced", "showPoints"},
-}  # fmt: skip
-
-
-def test_the_layout_has_the_keys_that_the_panels_know(folder):
-    layout = json.loads((folder / "drive.foxglove.json").read_text())
-    assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
-    for name, panel in layout["configById"].items():
-        kind = name.split("!")[0]
-        assert set(panel) <= KEYS[kind], name
-        assert all(set(line) <= LINE for line in panel.get("paths", [])), name
-        if kind == "Plot":
-            assert set(panel) == KEYS[kind], "none of them is optional"
-    camera = {
-        "perspective", "distance", "phi", "thetaOffset", "targetOffset", "target", "targetOrientation", "fovy", "near", "far",
-    }  # fmt: skip
-    assert set(layout["configById"]["3D!drive"]["cameraState"]) == camera

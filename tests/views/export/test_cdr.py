@@ -57,7 +57,8 @@ def test_transforms(names):
         )
         for stamp, row in zip(STAMPS.tolist(), poses.tolist(), strict=True)
     ]
-    assert_equal(samples.transforms("/tf", STAMPS, names, poses), expected)
+    laid = np.stack([samples._pose7(poses[:, i]) for i in range(len(names))], axis=1)
+    assert_equal(samples.transforms("/tf", STAMPS, names, laid), expected)
 
 
 def test_odometry_and_twists():
@@ -82,14 +83,6 @@ def test_odometry_and_twists():
         samples.odometry("/odom", ("odom", "base_footprint"), STAMPS, pose, twist, of_pose, of_twist), expected
     )
     assert_equal(samples.twists("/cmd_vel", STAMPS, twist), twists)
-
-
-def test_numbers():
-    values = np.array([0.5, -1.0, math.inf, 3.0])
-    expected = [of("std_msgs/msg/Float64", data=value) for value in values.tolist()]
-    assert_equal(samples.numbers("/clearance", "std_msgs/msg/Float64", "f8", STAMPS, values), expected)
-    small = [of("std_msgs/msg/UInt8", data=value) for value in (0, 7, 255, 1)]
-    assert_equal(samples.numbers("/limiter", "std_msgs/msg/UInt8", "u1", STAMPS, np.array([0, 7, 255, 1])), small)
 
 
 def log_with_scans(beams, field_of_view):

@@ -93,15 +93,6 @@ def test_a_plan_has_all_kinds_of_figures_in_pixels_and_vectors(planned, tmp_path
     assert near(pixels(made["tour"]), (121, 136, 160)) > 1000, "obstacles"
 
 
-def test_bars_rise_with_the_field(planned, tmp_path):
-    _, grid, _ = planned
-    field = np.zeros(grid.shape)
-    flat = pixels(bars_figure(grid, field, tmp_path / "flat.png", dpi=60))
-    field[2, 2] = 1
-    peak = pixels(bars_figure(grid, field, tmp_path / "peak.png", dpi=60))
-    assert (np.abs(flat - peak).max(axis=-1) > 40).sum() > 50
-
-
 def test_a_large_field_is_drawn_with_fewer_bars_that_keep_its_peaks(tmp_path, monkeypatch):
     grid = rasterise(World("wide", (0, 0, 20, 20)), 0.1, 0.1)
     heights = []
@@ -125,13 +116,6 @@ def test_an_iterative_planner_gets_its_history_and_field(planned, searched, plai
     picture = pixels(plan_figure(task, grid, learnt, ROBOT, tmp_path / "learnt.png", dpi=80))
     assert near(picture, (18, 63, 122), 40) > 500, "the field's dark end"
     assert picture.shape[1] > 1.3 * plain.shape[1]
-
-
-def test_a_failed_plan_gives_the_reason(planned, tmp_path):
-    task, grid, _ = planned
-    failed = PlanResult(status=PlanStatus.NO_PATH, reason="walled in")
-    figure = plan_figure(task, grid, failed, ROBOT, tmp_path / "failed.png", dpi=80)
-    assert near(pixels(figure), (204, 32, 42), 24) > 40
 
 
 @pytest.mark.parametrize("tall", [False, True])
@@ -192,32 +176,6 @@ def test_the_first_plan_of_a_robot_without_a_map_is_said_to_be_one_and_lies_in_t
     words = [{text.get_text() for text in panels(one)["map"].get_legend().get_texts()} for one in (blind, known)]
     assert "obstacle, not on a map" in words[0]
     assert "obstacle" in words[1]
-
-
-def history(start, n=20):
-    best = start + np.exp(-np.arange(n) / 4)
-    return History(best=best, iteration_best=best, iteration_mean=best + 1, arrived=np.full(n, 5))
-
-
-def test_each_planner_keeps_its_colour(tmp_path):
-    for name in ("ants", "mmas"):
-        picture = pixels(
-            history_figure({name: [history(4), history(5)]}, tmp_path / f"{name}.png", dpi=80, optimum=3.9)
-        )
-        other = "mmas" if name == "ants" else "ants"
-        assert near(picture, label_styles([name])[0].colour) > 100
-        assert near(picture, label_styles([other])[0].colour) == 0
-
-
-def test_lengths_by_ants_and_sweeps_are_drawn(tmp_path):
-    lengths = {10: [41.0, 44.0], 100: [38.0, 39.0], 500: [36.0, 36.5]}
-    picture = pixels(
-        ants_figure(lengths, tmp_path / "a.png", planner="aco-han", optimum=30.0, printed={10: 45.0}, dpi=80)
-    )
-    assert near(picture, label_styles(["aco-han"])[0].colour) > 100
-    table = {True: np.array([[30.0, 31.0], [32.0, np.nan]]), False: np.array([[33.0, 34.0], [35.0, 36.0]])}
-    sweep_figure([0.2, 0.4], [0.1, 0.3], table, tmp_path / "s.svg")
-    assert (tmp_path / "s.svg").stat().st_size > 3000
 
 
 #: Three runs on the maps 0, 1 and 0; the last finds its first path in the third of four iterations.

@@ -17,7 +17,7 @@ from antdrive.sim.log.record import ComponentRecord, ReplanRecord
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 from antdrive.views.colours import OUTCOME_LABELS
-from antdrive.views.film import film_options, overlay, playback, prelude, video
+from antdrive.views.film import overlay, playback, prelude, video
 from antdrive.views.film.comparison_film import SplitScreen, compare_film
 from antdrive.views.film.compositor import has_glow
 from antdrive.views.film.overlay import Layout, _entry_width, banner, legend_entries, legend_rows
@@ -113,22 +113,6 @@ def test_the_band_fits_every_size(drive, size):
         assert layout.height < 0.35 * size[1]
     shot = Shot(drive, camera="top", size=size, note="certified: min clearance 0.043 m")
     assert shot.frame(0.5).shape == (size[1], size[0], 3)
-
-
-def test_a_band_does_not_depend_on_what_it_showed_before(drive):
-    def band():
-        return Shot(drive, camera="top", size=SIZE, note="certified")._band
-
-    shown = [(9.96, 0.5, 0.123, 0.1), (10.0, 0.5, 12.123, -0.01), (10.1, 1.25, 0.123, -0.01), (10.1, 1.0, 0.1, -0.01)]
-    kept = band()
-    before = None
-    for numbers, status in zip(shown, [overlay.SLOWED, overlay.DRIVING, overlay.DRIVING, overlay.SLOWED], strict=True):
-        pictures = [np.zeros((kept.layout.height, SIZE[0], 3), dtype=np.uint8) for _ in range(2)]
-        for one, picture in zip((kept, band()), pictures, strict=True):
-            one.draw(overlay.drive_values(*numbers), status, picture)
-        assert np.array_equal(*pictures)
-        assert before is None or (pictures[0] != before).any()
-        before = pictures[0]
 
 
 DRIFTED = (
@@ -234,14 +218,6 @@ def test_a_failure_in_the_middle_leaves_no_file(drive, tmp_path, monkeypatch):
         film(drive, tmp_path / "drive.mp4", size=SIZE)
     assert [path.name for path in tmp_path.iterdir()] == ["drive.mp4"]
     assert (tmp_path / "drive.mp4").read_bytes() == b"an older film"
-
-
-def test_an_encoder_that_dies_is_reported(drive, tmp_path, monkeypatch):
-    broken = film_options.ENCODERS[".mp4"]._replace(options=("-c:v", "no-such-codec"))
-    monkeypatch.setitem(film_options.ENCODERS, ".mp4", broken)
-    with pytest.raises(InputError, match=r"drive\.mp4: cannot be written \(.*no-such-codec"):
-        film(drive, tmp_path / "drive.mp4", size=SIZE)
-    assert not list(tmp_path.iterdir())
 
 
 def test_memory_does_not_grow_with_the_film(made_up_drive, tmp_path):

@@ -170,7 +170,7 @@ def test_a_genuine_run_is_shown_as_certified(small_run, tmp_path):
     text = reported(tmp_path / "runs", tmp_path)
     assert "1 / 1" in text
     assert "Certified collision-free: at least" in text
-    assert "<dt>explored_m2</dt><dd>–</dd>" in text, "a robot with a map explores nothing"
+    assert "<dt>explored</dt><dd>–</dd>" in text, "a robot with a map explores nothing"
     assert "result.json: belongs to another log" not in text
     write_run(small_run, tmp_path / "others" / "a", digest="0" * 64)
     assert "result.json: belongs to another log: its digest differs" in reported(tmp_path / "others", tmp_path)

@@ -5,7 +5,6 @@ from collections import deque
 from fractions import Fraction
 
 import numpy as np
-import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -88,14 +87,6 @@ def test_cells_are_fully_covered_and_discs_reach_no_farther_than_the_overhang(ce
             assert (beyond_blocked(cells, inside) <= found.overhang + 2e-9).all()
 
 
-def test_the_check_of_covers_notices_a_disc_too_small_or_too_large():
-    cells = CellMap(np.array([[True, True, True], [True, False, True], [True, True, True]]), 0.05, (-12.2, 3.7))
-    (disc,) = cover(cells).discs
-    assert covered(cells, 1, 1, np.array([disc]))
-    assert not covered(cells, 1, 1, np.array([disc - [0, 0, 2e-9]]))
-    assert disc[2] - 0.025 == pytest.approx(0.05 * CORNER, abs=2e-9)
-
-
 def test_solid_ground_takes_fewer_discs_than_cells_and_a_larger_overhang_fewer_still():
     free = np.ones((40, 40), dtype=bool)
     free[8:32, 8:32] = False
@@ -166,22 +157,6 @@ def test_a_disc_that_only_touches_a_cell_does_not_block_it():
     world = World("one", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.5),))
     assert cell_map(world, 1.0).free.sum() == 8
     assert cell_map(World("one", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.50001),)), 1.0).free.sum() == 4
-
-
-@given(worlds())
-@settings(max_examples=20)
-def test_a_world_made_from_a_worlds_cells_blocks_all_that_the_world_does(world):
-    cells = cell_map(world, 0.5)
-    spots = np.argwhere(cells.free)
-    assume(len(spots) > 1)
-    start, goal = centre(cells, *spots[0]), centre(cells, *spots[-1])
-    task = map_task(cells, (*start, 0.0), goal, name="m")
-    again = cell_map(task.world, 0.5)
-    reached = joined(cells.free, tuple(spots[0]), tuple(spots[-1]))
-    # The discs reach into cells beside the blocked ones, but a blocked cell that a free one touches stays blocked.
-    for row, col in touched_by(reached):
-        spot = again.cell_at(*centre(cells, row, col))
-        assert spot is None or not again.free[spot]
 
 
 def test_a_conversion_says_how_far_it_is():

@@ -17,6 +17,7 @@ origin: [-1.0, 2.0, 0.0]
 negate: 0
 occupied_thresh: 0.65
 free_thresh: 0.196
+name: keys of other tools are ignored
 """
 #: Two rows: free, unknown, occupied above; all free below.
 PGM = b"P5\n# by hand\n3 2\n255\n" + bytes([254, 205, 0, 254, 254, 254])
@@ -109,10 +110,6 @@ def test_colours_are_averaged_and_other_depths_understood(tmp_path):
     palette.putpalette([255, 255, 255, 9, 9, 9])
     palette.save(tmp_path / "made.png")
     assert rows_of(written(tmp_path, GOOD.replace("made.pgm", "made.png"))) == [[1, 0]]
-
-
-def test_keys_of_other_tools_are_ignored(tmp_path):
-    assert rows_of(written(tmp_path, GOOD + "name: office\n")) == [[1, 1, 1], [1, 0, 0]]
 
 
 def test_the_task_has_a_source_and_can_be_saved(tmp_path):

@@ -126,14 +126,6 @@ def test_map_server_out_and_in_is_the_same_cells(tmp_path_factory, world, resolu
         assert (again.start, again.goal, again.goal_tolerance) == (task.start, task.goal, task.goal_tolerance)
 
 
-def test_the_uppermost_row_of_the_image_is_the_worlds_uppermost(tmp_path):
-    world = World("w", (0.0, 0.0, 3.0, 2.0), (Disc(0.5, 1.5, 0.2),))
-    export_map_server(Task(world, (2.0, 0.5, 0.0), (1.0, 0.5)), tmp_path / "w.yaml", resolution=1.0)
-    assert (tmp_path / "w.pgm").read_bytes() == b"P5\n3 2\n255\n" + bytes([0, 254, 254, 254, 254, 254])
-    export_movingai_map(Task(world, (2.0, 0.5, 0.0), (1.0, 0.5)), tmp_path / "w.map", resolution=1.0)
-    assert (tmp_path / "w.map").read_text() == "type octile\nheight 2\nwidth 3\nmap\n@..\n...\n"
-
-
 @given(worlds(), st.sampled_from([0.25, 0.3, 1.1]))
 @settings(max_examples=25)
 def test_movingai_out_and_in_is_the_same_cells(tmp_path_factory, world, resolution):

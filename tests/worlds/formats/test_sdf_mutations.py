@@ -13,37 +13,11 @@ from tests.worlds.formats.test_sdf_includes import actor, include, model_in, pos
 from tests.worlds.formats.test_sdf_shapes import SHAPES, TENT, placed, stl
 
 NUMBERS = (
-    "nan",
-    "inf",
-    "-inf",
-    "-1",
-    "0",
-    "1e300",
-    "1e-300",
-    "1e6",
-    "999999",
-    "1e5",
-    "0x10",
-    "",
-    "one",
-    "1 2",
-    "1,2,3",
-    "٣",
-)
+    "nan", "inf", "-inf", "-1", "0", "1e300", "1e-300", "1e6", "999999", "1e5", "0x10", "", "one", "1 2", "1,2,3", "٣",
+)  # fmt: skip
 NAMES = (
-    "post",
-    "base",
-    "l",
-    "",
-    "__model__",
-    "world",
-    "post::l",
-    "../..",
-    "a" * 300,
-    "\x7f",
-    "model://post",
-    "file:///dev/zero",
-)
+    "post", "base", "l", "", "__model__", "world", "post::l", "../..", "a" * 300, "\x7f", "model://post", "file:///dev/zero",
+)  # fmt: skip
 
 
 def base(folder):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from antdrive.base.errors import InputError
 from antdrive.base.version import require_physics
 from antdrive.cli import options
-from antdrive.cli.console import bar, campaign_bar, print_error, show
+from antdrive.cli.console import bar, print_error, show
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults
 from antdrive.sim.settings import SETTINGS
@@ -71,7 +71,7 @@ def barn(
     data = challenge.campaign_data(folder, trials, planner, robot, given, with_map=with_map)
     campaign = make_campaign(data, source="barn", options={**OPTIONS, "seeds": "--trials", "planners": "--planner"})
     fastest = challenge.reference_times(folder)
-    with campaign_bar("driving") as progress:
+    with bar("driving") as progress:
         results = sweep(campaign, out / "runs", jobs=jobs, keep="failed", progress=progress, notify=print_error)
     found = challenge.BarnTable.of(results.table, fastest, kind, with_map=with_map)
     if not json:

@@ -75,7 +75,7 @@ def _drive(
     json: bool,
 ) -> "tuple[list[CheckResult], list[str]]":
     """Drive and evaluate all named tests, and print each result; return the results and the unused baselines."""
-    from antdrive.testing.checking import check_tests
+    from antdrive.testing.checking import evaluate_tests
     from antdrive.views.artefacts import Films, Results, cached_results
     from antdrive.views.run_folder import check_folder
 
@@ -93,7 +93,7 @@ def _drive(
 
     results = Results(folder or cached_results(Path.cwd()), cast("Films", film))
     with bar("driving") as progress:
-        return check_tests(
+        return evaluate_tests(
             words, only=only, jobs=jobs, update=update, results=results, choose=with_calibrated_margin,
             report=(lambda _: None) if json else report, progress=progress,
         )  # fmt: skip

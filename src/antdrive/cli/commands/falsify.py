@@ -37,12 +37,12 @@ def falsify(
     Every world has a path. Failures are repeated in another process, shrunk, and written as a suite with films.
     Ctrl-C ends the search and keeps the failures found so far. Exit code 0: no failure. Exit code 1: at least one failure.
     """
-    from antdrive.runs.failures.hunt import check_method, find_failures
+    from antdrive.runs.failures.hunt import find_failures, validate_method
     from antdrive.runs.failures.reproducers import failure_lines, write_reproducers
     from antdrive.sim.written import Written
     from antdrive.views.failure_folders import write_failures
 
-    check_method(method)
+    validate_method(method)
     seed = given.pop("seed")
     scenario = setup.scenario(Written(world="empty"), given)
     mark = mark_of(scenario.key, budget, seed, method, obstacles, seconds)

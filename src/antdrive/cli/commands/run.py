@@ -4,9 +4,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from antdrive.base.atomic import folder_lock
+from antdrive.base.progress import shown_progress
 from antdrive.base.tables import file_lines, marked
 from antdrive.cli import options
-from antdrive.cli.console import bar, planning, show, stage, this_command
+from antdrive.cli.console import bar, planning, show, this_command
 from antdrive.cli.options import flag, option
 from antdrive.cli.output import film_drives, print_idle_settings
 from antdrive.cli.scenario_options import Ends, Setup
@@ -38,7 +39,7 @@ def run(
     from antdrive.sim.pipeline import run as drive
     from antdrive.sim.summary import run_lines
 
-    with stage("reading the scenario"):
+    with shown_progress("reading the scenario"):
         scenario = setup.scenario(ends.of(world), given)
     folder = out or default_folder(scenario)
     if gui:
@@ -53,7 +54,7 @@ def run(
             planned = plan(scenario)
         with bar("driving") as progress:
             result = drive(scenario, planned=planned, progress=progress)
-        with stage("writing log and figures"):
+        with shown_progress("writing log and figures"):
             report = write_run(result, folder, this_command(), vector=vector, figures=figures)
         if film is not None and result.rollout is not None:
             with naming_saved(report["files"].values()):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 from antdrive.base.errors import InputError
 from antdrive.base.files import known_suffix
 from antdrive.cli import options
-from antdrive.cli.console import campaign_bar, print_error, show
+from antdrive.cli.console import bar, print_error, show
 from antdrive.cli.exits import SUCCEEDED
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults
@@ -82,7 +82,7 @@ def sweep(
 
     if out is None and not dry_run:
         raise InputError("--out: missing; name the output folder")
-    _check(keep, dask, jobs, report, dry_run)
+    _validate(keep, dask, jobs, report, dry_run)
     requested = campaign_from(
         campaign, given, worlds=world, generate=generate, planners=planner, options=settings, robots=robot, seeds=seeds,
         tasks=tasks, run_limit=run_limit,
@@ -98,7 +98,7 @@ def sweep(
         counts = {"duplicates": expansion.duplicates, "counts": expansion.counts}
         show(json, {"runs": size, "missing": missing, **counts}, expansion.lines(missing))
         return SUCCEEDED
-    with campaign_bar("driving") as progress:
+    with bar("driving") as progress:
         rest |= {"jobs": jobs, "dask": dask, "keep": cast("Keep | None", keep)}
         results = make_runs(requested, out, expansion=expansion, progress=progress, notify=print_error, **rest)
     files: list[str] = []
@@ -110,7 +110,7 @@ def sweep(
     return print_faults(results.faults)
 
 
-def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
+def _validate(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
     """Raise an error about options without effect."""
     if report is not None:
         from antdrive.views.pages.report import SUFFIXES

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from antdrive.base.checks import pair
 from antdrive.base.errors import InputError
 from antdrive.base.files import summary_of
+from antdrive.base.progress import shown_progress
 from antdrive.base.tables import file_lines
 from antdrive.cli import options
-from antdrive.cli.console import bar, show, stage
+from antdrive.cli.console import bar, show
 from antdrive.cli.listings import Row, world_lines
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import import_target, numbers, pose
@@ -57,7 +58,7 @@ def show_world(
 
     if given["margin"] == "auto":
         raise InputError("--margin auto: applies to drives only; give a number of metres")
-    with stage("planning with astar"):
+    with shown_progress("planning with astar"):
         found = fit(ends.task_of(world), robot, **given)
     if out is not None:
         from antdrive.views.figures.plan_figures import plan_figure

@@ -1,7 +1,6 @@
 """Compiled ants: arrays in, arrays out, no validation.
 
-Nodes are flat cells; on a grid with turns, its nodes. `to` leads from node to node by each move: offsets (8,), or with turns a
-table (nodes, 8). The table `weights` (nodes, 8) of float32 holds the attraction of each move, 0 where the
+The table `weights` (nodes, 8) of float32 holds the attraction of each move, 0 where the
 move is not allowed. It encodes all rules of a colony and is filled once per iteration, so `walk_ants` serves every
 colony.
 """
@@ -9,7 +8,7 @@ colony.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +19,26 @@ from antdrive.worlds._kernels_turns import MoveGraph, after_move
 MIN_WEIGHT = 1e-30  # relative to the largest weight of a cell; within float32, so allowed moves keep a weight
 UNIT = np.float32(1.0 / 16777216.0)
 ZERO = np.float32(0.0)
+
+
+class AntGraph(NamedTuple):
+    """The ants' graph.
+
+    Attributes:
+        mask: the allowed moves of each node, one bit per direction (nodes,)
+        to: leads from node to node by each move: index offsets (8,), or with turns a table of nodes (nodes, 8)
+        cell: flat cell of each node (nodes,); empty without turns, where nodes are flat cells
+        cols: columns of the grid
+        start: the start node
+        goal: the goal node
+    """
+
+    mask: Array
+    to: Array
+    cell: Array
+    cols: int
+    start: int
+    goal: int
 
 
 @inline
@@ -98,12 +117,15 @@ def walk_length(walk: Array, size: int, to: Array) -> float:
 
 
 @kernel
+def longest_offset(to: Array) -> int:
+    """Return the index offset of the longest move; 0 for a table."""
+    return to[1] if to.ndim == 1 else 0
+
+
+@kernel
 def walk_ants(
     weights: Array,
-    mask: Array,
-    to: Array,
-    start: int,
-    goal: int,
+    graph: AntGraph,
     limit: int,
     revisit: float,
     backtrack: bool,
@@ -122,7 +144,8 @@ def walk_ants(
     The eight moves are unrolled and summed in pairs. A loop is 1 to 2 % slower; its order of summation would
     round differently and change plans.
     """
-    pad = to[1] if to.ndim == 1 else 0  # the longest move, so cells around the grid can be read without a check
+    mask, to, _, _, start, goal = graph
+    pad = longest_offset(to)  # so cells around the grid can be read without a check
     visited = np.zeros(len(mask) + 2 * pad, dtype=np.int32)  # number of the last ant at each cell, from 1
     again = np.float32(revisit)
     taken = 0
@@ -192,19 +215,6 @@ def walk_ants(
 
 
 @kernel
-def summarise(lengths: Array) -> tuple[int, float, int]:
-    """Return the number of walks that arrived, their mean length, and the row of the shortest; others have length inf."""
-    count, total, first = 0, 0.0, 0
-    for a in range(len(lengths)):
-        if lengths[a] < np.inf:
-            count += 1
-            total += lengths[a]
-            if lengths[a] < lengths[first]:
-                first = a
-    return count, (total / count if count else np.inf), first
-
-
-@kernel
 def copy_without_loops(walk: Array, size: int, last: Array, tour: Array) -> int:
     """Write the walk without loops to `tour`, continuing from the last visit of each cell; returns the tour's size.
 
@@ -218,18 +228,6 @@ def copy_without_loops(walk: Array, size: int, last: Array, tour: Array) -> int:
         n += 1
         s = last[walk[s]] + 1
     return n
-
-
-@kernel
-def cut_loops(
-    walks: Array, sizes: Array, mask: Array, to: Array, tours: Array, tour_sizes: Array, lengths: Array
-) -> None:
-    """Write walk a without loops to row a of `tours`."""
-    last = np.empty(len(mask), dtype=np.int64)
-    for a in range(len(sizes)):
-        n = copy_without_loops(walks[a], sizes[a], last, tours[a])
-        tour_sizes[a] = n
-        lengths[a] = walk_length(tours[a], n, to) if n else np.inf
 
 
 @kernel
@@ -256,31 +254,21 @@ def cut_one_short(walk: Array, size: int, mask: Array, to: Array, first: int, pl
 
 
 @kernel
-def cut_short(
-    walks: Array, sizes: Array, mask: Array, to: Array, tours: Array, tour_sizes: Array, lengths: Array
+def cut(
+    walks: Array, sizes: Array, graph: AntGraph, short: bool, tours: Array, tour_sizes: Array, lengths: Array
 ) -> None:
-    """Write walk a cut short to row a of `tours`."""
+    """Write walk a to row a of `tours`, cut `short` or without its loops alone."""
+    mask, to, _, _, _, _ = graph
     place = np.full(len(mask), -1, dtype=np.int64)
     first: Any = np.int64(0)  # a literal 0 would compile `cut_one_short` a second time
     for a in range(len(sizes)):
-        n = cut_one_short(walks[a], sizes[a], mask, to, first, place, tours[a])
-        first += sizes[a]
+        if short:
+            n = cut_one_short(walks[a], sizes[a], mask, to, first, place, tours[a])
+            first += sizes[a]
+        else:
+            n = copy_without_loops(walks[a], sizes[a], place, tours[a])
         tour_sizes[a] = n
         lengths[a] = walk_length(tours[a], n, to) if n else np.inf
-
-
-@kernel
-def evaporate(trail: Array, evaporation: float) -> None:
-    """Multiply a flat `trail` by 1 - evaporation."""
-    for i in range(len(trail)):
-        trail[i] *= 1.0 - evaporation
-
-
-@kernel
-def clamp(trail: Array, least: float, most: float) -> None:
-    """Clamp a flat `trail` to [least, most]."""
-    for i in range(len(trail)):
-        trail[i] = min(max(trail[i], least), most)
 
 
 @kernel
@@ -386,23 +374,14 @@ def union_moves(walks: Array, sizes: Array, to: Array, moves: Array) -> None:
 
 @kernel
 def detour_weights(
-    mask: Array,
-    to: Array,
-    cell: Array,
-    cols: int,
-    start: int,
-    goal: int,
-    greed: float,
-    lane_pull: float,
-    lane: float,
-    to_goal: Array,
-    weights: Array,
+    graph: AntGraph, greed: float, lane_pull: float, lane: float, to_goal: Array, weights: Array
 ) -> None:
     """Set weights[i, k] to exp(-greed * detour), with detour the excess length of the path through move k.
 
     The length of the path from a cell to the goal is that over open ground plus `lane_pull` times the distance to a
     lane: a parallel to the line from start to goal, offset by `lane` cells. `to_goal` (nodes,) is working memory.
     """
+    mask, to, cell, cols, start, goal = graph
     from_cell = cell[start] if len(cell) else start
     r0, c0, r1, c1 = from_cell // cols, from_cell % cols, goal // cols, goal % cols
     distance = max(math.hypot(r1 - r0, c1 - c0), 1.0)
@@ -421,40 +400,11 @@ def detour_weights(
 
 
 @kernel
-def goal_pull(mask: Array, cell: Array, cols: int, r1: int, c1: int, plain: bool, out: Array) -> None:
-    """Set out[i, k] to the cosine between move k and the vector from node i to the goal, at least 0; or to their dot product."""
-    for i in range(len(mask)):
-        here = cell[i] if len(cell) else i
-        dr, dc = r1 - here // cols, c1 - here % cols
-        distance = math.hypot(dr, dc)
-        for k in range(8):
-            out[i, k] = 0.0
-            if distance > 0.0 and mask[i] & (1 << k):
-                dot = DROW[k] * dr + DCOL[k] * dc
-                along = dot / distance
-                out[i, k] = dot if plain else max(0.0, along / SQRT2 if k & 1 else along)
-
-
-@kernel
-def fixed_pull(mask: Array, dr: float, dc: float, out: Array) -> None:
-    """Set out[i, k] to the dot product of move k (not normalised) and a direction common to all cells, at least 0."""
-    for i in range(len(mask)):
-        for k in range(8):
-            out[i, k] = max(0.0, DROW[k] * dr + DCOL[k] * dc) if mask[i] & (1 << k) else 0.0
-
-
-@kernel
 def attracted_weights(
-    trail: Array,
-    mask: Array,
-    to: Array,
-    omega: Array,
-    attraction: float,
-    shares: bool,
-    min_weight: float,
-    weights: Array,
+    trail: Array, graph: AntGraph, omega: Array, attraction: float, shares: bool, min_weight: float, weights: Array
 ) -> None:
     """Set weights[i, k] to trail + attraction * omega; with `shares`, the trail's fraction of all neighbours' trails."""
+    mask, to, _, _, _, _ = graph
     for i in range(len(mask)):
         scale = 1.0
         if shares:

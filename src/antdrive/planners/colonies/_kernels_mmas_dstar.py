@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.planners.colonies._kernels_colony import after
+from antdrive.planners.colonies._kernels_colony import AntGraph, after
 from antdrive.planners.graph._kernels_incremental import offsets, put, take
 from antdrive.worlds._kernels import DCOL, DROW, Array, kernel
 from antdrive.worlds._kernels_turns import MoveGraph, behind
@@ -127,18 +127,9 @@ def touch(mask: Array, cols: int, start: int, goal: int, nearest: bool, onward: 
 
 
 @kernel
-def decide(
-    mask: Array,
-    to: Array,
-    cell: Array,
-    cols: int,
-    here: int,
-    goal: int,
-    alpha: float,
-    beta: float,
-    pheromone: Array,
-) -> Any:
+def decide(graph: AntGraph, here: int, alpha: float, beta: float, pheromone: Array) -> Any:
     """Return the allowed next node with the smallest pheromone^alpha * distance^beta; -1 if none has pheromone."""
+    mask, to, cell, cols, _, goal = graph
     r1, c1 = goal // cols, goal % cols
     least = np.inf
     best: Any = np.int64(-1)
@@ -157,28 +148,17 @@ def decide(
 
 
 @kernel
-def descend(
-    mask: Array,
-    to: Array,
-    cell: Array,
-    cols: int,
-    start: int,
-    goal: int,
-    alpha: float,
-    beta: float,
-    pheromone: Array,
-    walk: Array,
-) -> int:
+def descend(graph: AntGraph, alpha: float, beta: float, pheromone: Array, walk: Array) -> int:
     """Fill `walk` with nodes, each after the last one the next with the smallest pheromone^alpha * distance^beta.
 
     Returns their number; it is negative if the walk would return to one of its nodes.
     """
-    been = np.zeros(len(mask), dtype=np.bool_)
-    walk[0], n = start, 1
-    been[start] = True
-    i = start
-    while i != goal:
-        j = decide(mask, to, cell, cols, i, goal, alpha, beta, pheromone)
+    been = np.zeros(len(graph.mask), dtype=np.bool_)
+    walk[0], n = graph.start, 1
+    been[graph.start] = True
+    i = graph.start
+    while i != graph.goal:
+        j = decide(graph, i, alpha, beta, pheromone)
         if j < 0 or been[j]:
             return -n
         i = j

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from antdrive.planners.colonies._kernels_colony import (
+    AntGraph,
     after,
     copy_without_loops,
     cut_one_short,
@@ -18,22 +19,6 @@ from antdrive.planners.colonies._kernels_colony import (
 from antdrive.worlds._kernels import SQRT2, Array, inline, kernel
 
 LISTED, ENTRIES = 0, 1  # indices of `Ranking.counts`
-
-
-class Graph(NamedTuple):
-    """The ants' graph, as `ColonyGraph`.
-
-    Attributes:
-        mask: the allowed moves of each node, one bit per direction (nodes,)
-        to: the index offset of each of the eight moves (8,), or the node that it leads to (nodes, 8)
-        start: the start node
-        goal: the goal node
-    """
-
-    mask: Array
-    to: Array
-    start: int
-    goal: int
 
 
 class Rules(NamedTuple):
@@ -211,7 +196,7 @@ def draw(cumulated: Array, state: Any, total: float) -> int:
 
 
 @kernel
-def cut_walk_short(ant: int, ants: Ants, graph: Graph, first: int, place: Array, tour: Array) -> None:
+def cut_walk_short(ant: int, ants: Ants, graph: AntGraph, first: int, place: Array, tour: Array) -> None:
     """Cut an ant's walk short; `first`, `place` and `tour` are those of `cut_one_short`."""
     walk = ants.walks[ant]
     size = cut_one_short(walk, ants.sizes[ant], graph.mask, graph.to, first, place, tour)
@@ -244,7 +229,7 @@ def decay(trail: Array, mask: Array, min_pheromone: float, evaporation: float) -
 def run_colony(
     trail: Array,
     heuristic: Array,
-    graph: Graph,
+    graph: AntGraph,
     rules: Rules,
     ants: Ants,
     ranking: Ranking,

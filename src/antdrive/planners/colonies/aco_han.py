@@ -13,6 +13,7 @@ from antdrive.base.errors import require
 from antdrive.base.records import require_choices
 from antdrive.planners.colonies.colony import (
     FIRST_KIND,
+    STEP,
     ChoiceContext,
     Colony,
     ColonyGraph,
@@ -85,19 +86,20 @@ class AcoHan(Colony):
 
     def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
         """Return Omega of eq. 4.2.1, the pull of each move of `graph` to the goal."""
-        from antdrive.planners.colonies import _kernels_colony
+        from antdrive.worlds._kernels import DCOL, DROW
 
-        omega = np.empty((len(graph.mask), 8))
-        cols = graph.shape[1]
-        row, col = divmod(graph.goal, cols)
-        if self.form != "listing":
-            _kernels_colony.goal_pull(graph.mask, graph.turns.cell, cols, row, col, self.form == "letter", omega)
-        else:
-            from_row, from_col = graph.cell_of(graph.start)
-            rows_ahead, cols_ahead = row - from_row, col - from_col
-            distance = math.hypot(rows_ahead, cols_ahead)
-            _kernels_colony.fixed_pull(graph.mask, rows_ahead / distance, cols_ahead / distance, omega)
-        return omega
+        here = np.stack([graph.of_nodes(index) for index in np.indices(graph.shape)])
+        ahead = np.array(graph.cell_of(graph.goal))[:, np.newaxis] - here  # (2, nodes)
+        if self.form == "listing":
+            rows, cols = ahead[:, graph.start].tolist()
+            distance = math.hypot(rows, cols)
+            pull = np.maximum(0.0, DROW * (rows / distance) + DCOL * (cols / distance))
+            return np.where(graph.allowed, pull, 0.0)
+        away = np.hypot(*ahead)[:, np.newaxis]
+        pull = DROW * ahead[0, :, np.newaxis] + DCOL * ahead[1, :, np.newaxis]
+        if self.form != "letter":
+            pull = np.maximum(0.0, pull / np.where(away > 0, away, 1.0) / STEP)
+        return np.where(graph.allowed & (away > 0), pull, 0.0)
 
     def choice_weights(
         self,
@@ -115,7 +117,7 @@ class AcoHan(Colony):
 
         by_fraction = self.form != "listing"
         _kernels_colony.attracted_weights(
-            trail, graph.mask, graph.to, heuristic, self.attraction, by_fraction, self.min_weight, weights
+            trail, graph.arrays, heuristic, self.attraction, by_fraction, self.min_weight, weights
         )
 
     def update(self, trail: Floats, state: IterationState) -> None:
@@ -127,7 +129,7 @@ class AcoHan(Colony):
         if self.form == "listing":
             _kernels_colony.deposit_in_passing(trail, walks.cells, walks.sizes, amounts, self.evaporation)
         else:
-            _kernels_colony.evaporate(trail, self.evaporation)  # eq. 4.2.2
+            trail *= 1.0 - self.evaporation  # eq. 4.2.2
             _kernels_colony.deposit_on_cells(trail, walks.cells, walks.sizes, amounts)
         if self.elitism:
             elite = state.best if self.elite_of == "run" else state.tours.shortest()

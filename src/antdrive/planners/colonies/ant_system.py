@@ -20,6 +20,7 @@ from antdrive.base.errors import require
 from antdrive.base.records import require_choices
 from antdrive.planners.colonies.colony import (
     FIRST_KIND,
+    STEP,
     ChoiceContext,
     Colony,
     ColonyGraph,
@@ -28,9 +29,6 @@ from antdrive.planners.colonies.colony import (
     Walks,
     Weights,
 )
-
-#: The length of each move [cells].
-STEP = np.sqrt([1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,9 +93,7 @@ class AntSystem(Colony):
         if self.heuristic == "goal":
             eta = graph.nearness()  # ibraheem2016 eq. 6
         else:
-            eta = np.where(
-                np.isfinite(graph.at_neighbours(np.ones(len(graph.mask)))), 1.0 / STEP, -np.inf
-            )  # suganthi2019 eq. 6
+            eta = np.where(graph.allowed, 1.0 / STEP, -np.inf)  # suganthi2019 eq. 6
         beta = ibraheem_beta(max(graph.shape)) if self.beta is None else self.beta
         return normalised(eta, beta)
 
@@ -124,7 +120,7 @@ class AntSystem(Colony):
         tours, amounts = state.tours, self.amounts(state)
         if self.ranks is not None:
             amounts = amounts * ranked(tours.lengths, self.ranks)
-        _kernels_colony.evaporate(trail.ravel(), self.evaporation)  # eq. 2, first term
+        trail *= 1.0 - self.evaporation  # eq. 2, first term
         _kernels_colony.deposit_on_arcs(trail, state.graph.to, tours.cells, tours.sizes, amounts)  # eq. 2-3
 
     def amounts(self, state: IterationState) -> Floats:
@@ -344,13 +340,13 @@ class MaxMinAnts(AntSystem):
             if state.first == 0:
                 trail.fill(tau_max)  # section 3.4
             return
-        _kernels_colony.evaporate(trail.ravel(), self.evaporation)
+        trail *= 1.0 - self.evaporation
         tours = self.depositor(state)
         if tours is not None:
             _kernels_colony.deposit_on_arcs(
                 trail, state.graph.to, tours.cells, tours.sizes, self.deposit / tours.lengths
             )
-        _kernels_colony.clamp(trail.ravel(), tau_min, tau_max)
+        np.clip(trail, tau_min, tau_max, out=trail)
 
     def depositor(self, state: IterationState) -> Walks | None:
         """Return the tour that deposits: the best of the iteration in `state` or, periodically, the best so far."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -20,12 +20,16 @@ from antdrive.planners.iterative import Iteration, IterativePlanner
 from antdrive.planners.plan import Capabilities, Query
 
 if TYPE_CHECKING:  # importing a grid loads the compiler
+    from antdrive.planners.colonies._kernels_colony import AntGraph
     from antdrive.worlds._kernels_turns import MoveGraph
     from antdrive.worlds.grid import Turns
 
 Flat = npt.NDArray[np.int32]  # flat cell indices
 Weights = npt.NDArray[np.float32]  # (nodes, 8)
 Heuristic = npt.NDArray[np.floating[Any]]  # (nodes, 8)
+
+#: The length of each move [cells].
+STEP = np.sqrt([1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +58,13 @@ class ColonyGraph:
             _kernels_colony.table_of(grid.graph, kept, goal, mask, to)
             mask.setflags(write=False)  # as a grid's
         return cls(mask, to, grid.shape, query.start_node, goal, grid.turns)
+
+    @property
+    def arrays(self) -> AntGraph:
+        """The graph for compiled ants."""
+        from antdrive.planners.colonies._kernels_colony import AntGraph
+
+        return AntGraph(self.mask, self.to, self.turns.cell, self.shape[1], self.start, self.goal)
 
     @property
     def moves(self) -> MoveGraph:
@@ -97,6 +108,11 @@ class ColonyGraph:
     def of_nodes(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return the value of each node's cell (nodes,), from those of the cells (R, C)."""
         return values.ravel()[self.turns.cell] if self.turns else values.ravel()
+
+    @property
+    def allowed(self) -> npt.NDArray[np.bool_]:
+        """Whether each move is allowed (nodes, 8)."""
+        return self.mask[:, np.newaxis] >> np.arange(8) & 1 > 0
 
     def nearness(self) -> Floats:
         """Return 1 / distance from the target of each move to the goal (nodes, 8) [1/cells]; -inf where it is not allowed."""
@@ -145,9 +161,9 @@ class Walks:
 
     def summary(self) -> WalkSummary:
         """Count the ants that arrived and measure their walks."""
-        from antdrive.planners.colonies import _kernels_colony
-
-        return WalkSummary(*_kernels_colony.summarise(self.lengths))
+        lengths = self.lengths[np.isfinite(self.lengths)]
+        mean = float(lengths.cumsum()[-1]) / len(lengths) if len(lengths) else math.inf
+        return WalkSummary(len(lengths), mean, int(self.lengths.argmin()))
 
     @classmethod
     def allocate(cls, ants: int, room: int) -> Walks:
@@ -425,47 +441,27 @@ class TourConstruction:
     def _send(self, seeds: npt.NDArray[np.uint64], kind: int, ants: slice) -> int:
         from antdrive.planners.colonies import _kernels_colony
 
-        walks = self.walks.rows(ants)
-        return int(
-            _kernels_colony.walk_ants(
-                self.weights[kind],
-                self.graph.mask,
-                self.graph.to,
-                self.graph.start,
-                self.graph.goal,
-                self.limit,
-                float(self.planner.revisit),
-                self.planner.backtrack,
-                seeds,
-                walks.cells,
-                walks.sizes,
-                walks.lengths,
-            )
-        )
+        walks, planner = self.walks.rows(ants), self.planner
+        rules = self.limit, float(planner.revisit), planner.backtrack
+        out = walks.cells, walks.sizes, walks.lengths
+        return int(_kernels_colony.walk_ants(self.weights[kind], self.graph.arrays, *rules, seeds, *out))
 
     def shorten(self, ants: slice) -> Walks:
         """Return the tours of some ants: without loops and, with `Colony.shortcut`, cut short."""
-        walks, tours = self.walks.rows(ants), self.shortened.rows(ants)
-        if self.planner.shortcut:
-            return cut_short(walks, self.graph, tours)
-        return without_loops(walks, self.graph, tours) if self.planner.revisit else walks
+        walks, planner = self.walks.rows(ants), self.planner
+        if planner.shortcut or planner.revisit:
+            return cut(walks, self.graph, self.tours.rows(ants), short=planner.shortcut)
+        return walks
 
 
-def without_loops(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Walks:
-    """Return the walks with their loops cut out."""
+def cut(walks: Walks, graph: ColonyGraph, tours: Walks | None = None, *, short: bool) -> Walks:
+    """Return the walks without loops, in `tours` if given.
+
+    Cut `short` they lead from each cell straight to the walk's last cell that is one allowed move away.
+    """
     from antdrive.planners.colonies import _kernels_colony
 
-    return _cut(_kernels_colony.cut_loops, walks, graph, out)
-
-
-def cut_short(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Walks:
-    """Return the walks cut short: from each cell straight to the walk's last cell that is one allowed move away."""
-    from antdrive.planners.colonies import _kernels_colony
-
-    return _cut(_kernels_colony.cut_short, walks, graph, out)
-
-
-def _cut(kernel: Callable[..., None], walks: Walks, graph: ColonyGraph, out: Walks | None) -> Walks:
-    tours = Walks.allocate(*walks.cells.shape) if out is None else out
-    kernel(walks.cells, walks.sizes, graph.mask, graph.to, tours.cells, tours.sizes, tours.lengths)
+    tours = tours or Walks.allocate(*walks.cells.shape)
+    out = tours.cells, tours.sizes, tours.lengths
+    _kernels_colony.cut(walks.cells, walks.sizes, graph.arrays, short, *out)
     return tours

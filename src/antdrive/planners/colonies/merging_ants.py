@@ -131,19 +131,8 @@ class MergingAnts(MaxMinAnts):
     def _detour_weights(self, graph: ColonyGraph, out: Weights, lane_pull: float = 0.0, lane: float = 0.0) -> Weights:
         from antdrive.planners.colonies import _kernels_colony
 
-        _kernels_colony.detour_weights(
-            graph.mask,
-            graph.to,
-            graph.turns.cell,
-            graph.shape[1],
-            graph.start,
-            graph.goal,
-            self.greed,
-            lane_pull,
-            lane,
-            np.empty(len(graph.mask)),
-            out,
-        )
+        to_goal = np.empty(len(graph.mask))
+        _kernels_colony.detour_weights(graph.arrays, self.greed, lane_pull, lane, to_goal, out)
         return out
 
     def daemon_action(self, graph: ColonyGraph, tours: Walks, best: Walks | None) -> Walks | None:

@@ -134,18 +134,7 @@ class MaxMinDStar(GridPlanner):
         walk = np.empty(len(graph.mask), dtype=np.int32)
         size, note = 0, ""
         for circles, (alpha, beta) in enumerate(self.exponents()):
-            size = kernels.descend(
-                graph.mask,
-                graph.to,
-                graph.turns.cell,
-                graph.shape[1],
-                graph.start,
-                graph.goal,
-                alpha,
-                beta,
-                pheromone,
-                walk,
-            )
+            size = kernels.descend(graph.arrays, alpha, beta, pheromone, walk)
             if circles:
                 note = f"the ant went in circles {circles} times: {self.describe_exponents(alpha, beta)}"
             if size > 0:
@@ -235,20 +224,8 @@ class PheromoneAgent(SteppingAgent):
         return to // cols, to % cols
 
     def _best_neighbour(self, mask: npt.NDArray[np.uint8], here: int) -> int:
-        graph = self._graph
-        return int(
-            self._kernels.decide(
-                mask,
-                graph.to,
-                graph.turns.cell,
-                graph.shape[1],
-                here,
-                graph.goal,
-                self._alpha,
-                self._beta,
-                self._pheromone,
-            )
-        )
+        graph = self._graph.arrays._replace(mask=mask)
+        return int(self._kernels.decide(graph, here, self._alpha, self._beta, self._pheromone))
 
     def _enter(self, cell: int) -> None:
         self._visits[cell] += 1

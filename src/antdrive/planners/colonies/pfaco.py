@@ -287,7 +287,7 @@ class AntPool:
         size, self.shortest, steps, arrived = _kernels_pfaco.run_colony(
             trail,
             heuristic,
-            _kernels_pfaco.Graph(graph.mask, graph.to, graph.start, graph.goal),
+            graph.arrays,
             rules,
             self.ants,
             self.ranking,

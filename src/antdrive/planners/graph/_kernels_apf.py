@@ -82,35 +82,6 @@ def disc_distances(discs: Array, x0: float, y0: float, cell: float, inflate: flo
 
 
 @kernel
-def potential(
-    free: Array,
-    distance: Array,
-    r1: int,
-    c1: int,
-    cell: float,
-    k_att: float,
-    k_rep: float,
-    influence: float,
-    out: Array,
-) -> None:
-    """Fill `out` with the potential U (eq. 7): attraction to the goal (eq. 9) and repulsion from obstacles (eq. 11).
-
-    It is infinite in blocked cells.
-    """
-    rows, cols = free.shape
-    for r in range(rows):
-        for c in range(cols):
-            if not free[r, c]:
-                out[r, c] = np.inf
-                continue
-            u = 0.5 * k_att * cell * cell * float((r - r1) * (r - r1) + (c - c1) * (c - c1))
-            if distance[r, c] <= influence:
-                push = 1.0 / max(distance[r, c], 1e-9) - 1.0 / influence
-                u += 0.5 * k_rep * push * push
-            out[r, c] = u
-
-
-@kernel
 def roll_down(moves: Array, field: Array, r0: int, c0: int, r1: int, c1: int) -> Array:
     """Return the cells (N, 2) along the steepest descent of the potential (eq. 5), to the goal or a local minimum."""
     cells = np.empty((64, 2), dtype=np.int32)

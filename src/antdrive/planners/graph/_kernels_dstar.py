@@ -111,8 +111,10 @@ def follow(graph: MoveGraph, start: int, goal: int, back: Array) -> tuple[Array,
 
 
 @kernel
-def begin(goals: Array, state: Array, h: Array, back: Array, heap: Array, place: Array) -> None:
-    """Initialise: only the goal's nodes are known and on the OPEN list."""
+def begin(
+    cols: int, start: int, goal: int, goals: Array, state: Array, h: Array, back: Array, heap: Array, place: Array
+) -> None:
+    """Initialise: only the goal's nodes are known and on the OPEN list; the first three arguments are D* Lite's."""
     h[:], back[:], place[:] = NEVER, 8, -1
     size: Any = np.int64(0)  # the compiler would treat a literal 0 as a separate type
     none: Any = np.int64(0)

@@ -66,15 +66,13 @@ class PotentialField(GridPlanner):
 
     def potential(self, query: Query) -> Floats:
         """Return the potential U of every cell (R, C), inf where blocked."""
-        from antdrive.planners.graph import _kernels_apf
-
         grid = query.grid
-        field = np.empty(grid.shape)
-        gains = (self.k_att, self.k_rep, self.influence)
-        _kernels_apf.potential(
-            grid.free, obstacle_distance(query, self.influence), *query.goal, grid.cell, *gains, field
-        )
-        return field
+        distance = obstacle_distance(query, self.influence)
+        rows, cols = (index - end for index, end in zip(np.indices(grid.shape), query.goal, strict=True))
+        attraction = 0.5 * self.k_att * grid.cell * grid.cell * (rows * rows + cols * cols)  # eq. 9
+        push = 1.0 / np.maximum(distance, 1e-9) - 1.0 / self.influence
+        repulsion = np.where(distance <= self.influence, 0.5 * self.k_rep * push * push, 0.0)  # eq. 11
+        return np.where(grid.free, attraction + repulsion, math.inf)  # eq. 7
 
 
 def obstacle_distance(query: Query, reach: float = math.inf) -> Floats:

@@ -247,7 +247,7 @@ class IncrementalSearch(CachedReplanner):
 
     Args:
         query: the initial query
-        kernels: the compiled search
+        kernels: the compiled search: D* by Stentz, or D* Lite optimised (Figure 4) in exact integer costs
         state: how many numbers it keeps
         values: type and initial value of each array that it keeps by node, besides its heap
     """
@@ -256,11 +256,13 @@ class IncrementalSearch(CachedReplanner):
         super().__init__(query)
         nodes = len(self._graph.mask)
         self._kernels, self._goal = kernels, query.goal_cell
-        self._goals = np.array(query.grid.nodes_at(query.goal), dtype=np.int64)
         self._state = np.empty(state, dtype=np.int64)
         self._initial = [initial for _, initial in values] + [0, -1]
         self._arrays: list[npt.NDArray[Any]] = [np.empty(nodes, dtype=kind) for kind, _ in values]
         self._arrays += [np.empty((nodes, 3), dtype=np.int64), np.empty(nodes, dtype=np.int32)]  # the heap, rows in it
+        goals = np.array(query.grid.nodes_at(query.goal), dtype=np.int64)
+        start, cols = self._index(query.start), query.grid.shape[1]
+        kernels.begin(cols, start, self._goal, goals, self._state, *self._arrays)
 
     def _replan(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
         if len(self._graph.mask) > len(self._arrays[0]):  # with turns, cells got more labels
@@ -308,20 +310,12 @@ class DStar(IncrementalPlanner):
     30.
     """
 
-    def replanner(self, query: Query, rng: np.random.Generator) -> DStarSearch:
+    def replanner(self, query: Query, rng: np.random.Generator) -> IncrementalSearch:
         """Return a search that can be repaired after its first plan; it does not use `rng`."""
-        return DStarSearch(query)
-
-
-class DStarSearch(IncrementalSearch):
-    """D*: Dijkstra's algorithm from the goal, with RAISE and LOWER states that propagate changes."""
-
-    def __init__(self, query: Query) -> None:
         from antdrive.planners.graph import _kernels_dstar as kernels
         from antdrive.planners.graph._kernels_incremental import NEVER
 
-        super().__init__(query, kernels, 1, [(np.int64, NEVER), (np.uint8, 8)])
-        kernels.begin(self._goals, self._state, *self._arrays)
+        return IncrementalSearch(query, kernels, 1, [(np.int64, NEVER), (np.uint8, 8)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -335,18 +329,9 @@ class DStarLite(IncrementalPlanner):
     D* one in a hundred takes 0.12 ms or more.
     """
 
-    def replanner(self, query: Query, rng: np.random.Generator) -> DStarLiteSearch:
+    def replanner(self, query: Query, rng: np.random.Generator) -> IncrementalSearch:
         """Return a search that can be repaired after its first plan; it does not use `rng`."""
-        return DStarLiteSearch(query)
-
-
-class DStarLiteSearch(IncrementalSearch):
-    """D* Lite: the optimised version (Figure 4 of the paper) in exact integer costs."""
-
-    def __init__(self, query: Query) -> None:
         from antdrive.planners.graph import _kernels_dstar_lite as kernels
         from antdrive.planners.graph._kernels_incremental import NEVER
 
-        super().__init__(query, kernels, 3, [(np.int64, NEVER)] * 2)
-        start, cols = self._index(query.start), query.grid.shape[1]
-        kernels.begin(cols, start, self._goal, self._goals, self._state, *self._arrays)
+        return IncrementalSearch(query, kernels, 3, [(np.int64, NEVER)] * 2)

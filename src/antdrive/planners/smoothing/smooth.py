@@ -152,9 +152,11 @@ def pull_taut(xy: npt.ArrayLike, discs: npt.ArrayLike, bounds: Bounds, inflate: 
     Returns:
         The path, or None if the polyline itself does not keep the distance.
     """
+    from antdrive.worlds import _kernels
+
     line = np.array(xy, dtype=np.float64, order="C").reshape(-1, 2)
     built = np.array(discs, dtype=np.float64, order="C").reshape(-1, 3)
-    if not _clears(line, built, bounds, inflate):
+    if _kernels.polyline_clearance(line, built, np.asarray(bounds, dtype=np.float64)) < inflate - SLACK:
         return None
     string = _pulled(line, built, inflate)
     return None if string is None else _path(string)
@@ -192,15 +194,6 @@ def _runs(clearances: Floats, inflate: float) -> Iterator[tuple[int, int, bool]]
     cuts = [0, *(np.flatnonzero(clear[1:] != clear[:-1]) + 1).tolist(), len(clear)]
     for first, last in itertools.pairwise(cuts):
         yield first, last, bool(clear[first])
-
-
-def _clears(xy: Floats, discs: Floats, bounds: Bounds, inflate: float) -> bool:
-    from antdrive.worlds import _kernels
-
-    clearances = np.empty(len(xy) - 1)
-    box = np.asarray(bounds, dtype=np.float64)
-    _kernels.segment_clearances(np.ascontiguousarray(xy[:-1]), np.ascontiguousarray(xy[1:]), discs, box, clearances)
-    return bool((clearances >= inflate - SLACK).all())
 
 
 def _smoothed(

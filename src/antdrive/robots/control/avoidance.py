@@ -158,7 +158,9 @@ class Avoidance:
             (near, slow, False), (near, slow, outlined), (near, backwards, outlined), (math.inf, backwards, outlined),
             (math.inf, math.inf, outlined),
         ]  # fmt: skip
-        if self._must_dodge(spec, pose, places, observed, radii):
+        if kernels.must_dodge(
+            *pose[:2], places, observed, radii, WALKING, SURPRISE, self.step, self.horizon, spec.max_speed, spec.radius,
+        ):  # fmt: skip
             limits_of[:3] = [(math.inf, backwards, False)]
         given_way = None  # a decision to slow down, unless the robot can pass beside its route by its outline
         for fastest, reverse, by_outline in dict.fromkeys(limits_of):
@@ -181,7 +183,8 @@ class Avoidance:
         if chosen == 0 and contact == math.inf and wanted.speed <= candidates[0, kernels.SPEED]:
             return wanted, False, AvoidanceState(reversed=reversed_)
         turning = abs(last.yaw_rate) / limits.yaw_acceleration + self.step if last.yaw_rate else 0.0
-        too_late = self._too_late(weights, pose, places[0], radii)
+        # A contact this soon counts as unavoidable if a mover is too close.
+        too_late = 2 * self.step if kernels.is_close(*pose, places[0], radii, weights) else 0.0
         if contact < max(abs(last.speed) / limits.acceleration, turning, too_late):
             chosen = kernels.best_escape(*situation)
         twist, after = _execute(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked, pose, before.arc)
@@ -219,15 +222,6 @@ class Avoidance:
     def _predicted(self, places: Floats) -> Floats:
         """Return the movers' predicted velocities (M, 2) [m/s]."""
         return np.asarray((places[1] - places[0]) / self.step)
-
-    def _must_dodge(self, spec: RobotSpec, pose: Pose, places: Floats, observed: Floats, radii: Floats) -> bool:
-        """Return whether a mover that may come near soon is faster than people, or has another velocity than predicted."""
-        most = self.horizon, spec.max_speed, spec.radius
-        return kernels.must_dodge(*pose[:2], places, observed, radii, WALKING, SURPRISE, self.step, *most)
-
-    def _too_late(self, weights: kernels.AvoidanceWeights, pose: Pose, places: Floats, radii: Floats) -> float:
-        """Return the time below which a contact counts as unavoidable [s]: 0 unless a mover is too close."""
-        return 2 * self.step if kernels.is_close(*pose, places, radii, weights) else 0.0
 
     def _candidates(
         self, spec: RobotSpec, state: AvoidanceState, speed_limit: float, fastest: float, reverse: float, beside: bool

@@ -23,7 +23,7 @@ from annotated_types import Interval
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.caches import Keyed, cached
 from antdrive.base.errors import FieldError, require
-from antdrive.base.records import clamp_angle, derived, meanings_of, require_ranges
+from antdrive.base.records import clamp_angle, meanings_of, require_ranges, unchecked_copy
 from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
@@ -138,7 +138,7 @@ class TrackedPath:
         *samples, _, _, _, _, corners, numbers = self.packed
         numbers = numbers.copy()
         *arrays, numbers[SIDE] = obstacles
-        return derived(self, obstacles=obstacles, packed=(*samples, *arrays, corners, numbers))
+        return unchecked_copy(self, obstacles=obstacles, packed=(*samples, *arrays, corners, numbers))
 
     @property
     def ignoring_turn_clearance(self) -> TrackedPath:

@@ -30,7 +30,7 @@ from antdrive.base.optional import optional
 from antdrive.base.ros import ros_package
 from antdrive.base.types import Floats
 from antdrive.worlds.formats.meshes import read_mesh
-from antdrive.worlds.formats.xml import MAX_BYTES, parse_xml, pose_matrix
+from antdrive.worlds.formats.xml import MAX_BYTES, numbers_in, parse_xml, pose_matrix
 
 STAND_IN = f"{os.sep}missing package "  # start of the path of a missing package
 
@@ -452,11 +452,8 @@ def _numbers(
 ) -> Floats:
     if element is None or (text := element.get(key)) is None:
         return np.array(default)
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        values = np.array([math.nan])
-    if len(values) != len(default) or not (np.abs(values) <= most).all():
+    values = numbers_in(text, len(default), most)
+    if values is None:
         count = "a number" if len(default) == 1 else f"{len(default)} numbers"
         size = "" if math.isinf(most) else f" of at most {most:g}"
         raise input_error(str(path), f"<{element.tag} {key}={text!r}>", f"must be {count}{size}")

@@ -12,7 +12,7 @@ from antdrive.base.types import Floats
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint
 from antdrive.robots.spec import require_on_robot
-from antdrive.worlds.formats.xml import rotation_matrix
+from antdrive.worlds.formats.xml import numbers_in, rotation_matrix
 
 KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")  # Gazebo's sensor types for lidars
 LEVEL = 0.99  # minimum vertical component of a planar lidar's axis
@@ -114,14 +114,11 @@ def decimal(value: float) -> str:
     return f"{digits}0" if digits.endswith(".") else digits
 
 
-def _pose(sensor: ET.Element) -> tuple[float, ...]:
-    """Return a sensor's pose on its link: x, y, z [m], roll, pitch, yaw [rad]."""
+def _pose(sensor: ET.Element) -> Floats:
+    """Return a sensor's pose on its link (6,): x, y, z [m], roll, pitch, yaw [rad]."""
     text = sensor.findtext("pose") or "0 0 0 0 0 0"
-    try:
-        pose = tuple(float(word) for word in text.split())
-    except ValueError:
-        pose = ()
-    if len(pose) != 6 or not all(abs(value) <= 1e6 for value in pose):
+    pose = numbers_in(text, 6)
+    if pose is None:
         raise FieldError("pose", f"must be 6 numbers, got {text.strip()[:40]!r}")
     return pose
 
@@ -130,10 +127,7 @@ def _number(element: ET.Element, path: str, default: float) -> float:
     text = element.findtext(path)
     if text is None or not text.strip():
         return default
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= 1e6:
+    value = numbers_in(text, 1)
+    if value is None:
         raise FieldError(path.rpartition("/")[2], f"must be a number, got {text.strip()[:40]!r}")
-    return value
+    return float(value[0])

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from antdrive.base.checks import yaml_flow
 from antdrive.base.errors import InputError, few, input_error
 from antdrive.base.records import ranges_of
 from antdrive.base.types import Floats
@@ -244,7 +245,7 @@ def import_urdf(
         what += "" if math.isinf(below) else f", below {below:g} m"
         values = _values(model, wheels, outline, floor, given)
         lidar, seen, unused = import_lidar(lidar_sensors(model.root, model.places), frame, floor, outline)
-        rows = [] if lidar is None else [(f"lidar: {_flow(dataclasses.asdict(lidar))}", seen)]
+        rows = [] if lidar is None else [(f"lidar: {yaml_flow(dataclasses.asdict(lidar), decimal)}", seen)]
         text = _text(model, outline, what, values, rows)
         spec = _robot_in(text, path, values)
         doubts = [f"{v.key} {v.value:.4g} is {v.how}; --set {v.key}=VALUE overrides" for v in values if v.doubtful]
@@ -373,7 +374,7 @@ def _text(model: UrdfModel, outline: Footprint, what: str, values: list[_Value],
     if outline.box is not None and outline.corners:
         length, width, centre = outline.box
         foot = {"length": round(length, 9), "width": round(width, 9), "centre": [round(v, 9) for v in centre]}
-    rows.append((f"footprint: {_flow(foot)}", f"computed: {what}"))
+    rows.append((f"footprint: {yaml_flow(foot, decimal)}", f"computed: {what}"))
     rows += [(f"{value.key}: {_rounded(value)}", value.how) for value in values]
     rows += lidar
     rows.append((f"noise: {NOISE}", "assumed: as in the catalogue; measure the robot's own"))
@@ -394,14 +395,3 @@ def _rounded(value: _Value) -> str:
 
 def _printable(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)
-
-
-def _flow(entry: Mapping[str, object]) -> str:
-    return "{" + ", ".join(f"{key}: {_plain(value)}" for key, value in entry.items()) + "}"
-
-
-def _plain(value: object) -> str:
-    """Format numbers without exponent, which YAML takes for text."""
-    if isinstance(value, list):
-        return f"[{', '.join(map(_plain, value))}]"
-    return decimal(value) if isinstance(value, float) else str(value)

@@ -252,7 +252,7 @@ def load_campaign(path: str | os.PathLike[str]) -> Campaign:
     Raises:
         InputError: the file is missing or invalid.
     """
-    return _checked(read_document(path), Path(path).parent)
+    return _validated(read_document(path), Path(path).parent)
 
 
 def make_campaign(
@@ -273,7 +273,7 @@ def make_campaign(
         InputError: the data is invalid.
     """
     plain = {"schema": 1, **{key: _plain(value) for key, value in data.items()}}
-    return _checked(_CommandData(source, plain, options=options), Path(folder))
+    return _validated(_CommandData(source, plain, options=options), Path(folder))
 
 
 def _plain(value: Any) -> Any:
@@ -287,7 +287,7 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def _checked(document: Document, folder: Path) -> Campaign:
+def _validated(document: Document, folder: Path) -> Campaign:
     for key in SettingsEntry.model_fields.keys() & (document.data if isinstance(document.data, dict) else ()):
         raise document.error((key,), "unknown key; write it under settings")
     entry = check(CampaignFile, document)
@@ -348,6 +348,8 @@ class _CommandData(Document):
     def error(self, location: Location, problem: str) -> InputError:
         key = next((step for step in location if isinstance(step, str) and step != "settings"), None)
         option = self.options.get(key) if key else None
+        if option and key == "planners" and isinstance(location[-1], str) and location[-1] not in ("planners", "name"):
+            option = f"--set planner.{location[-1]}"
         return InputError(f"{option}: {problem}") if option else super().error(location, problem)
 
 

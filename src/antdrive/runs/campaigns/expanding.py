@@ -18,8 +18,8 @@ from antdrive.robots import list_robots, load_robot
 from antdrive.runs.campaigns.campaign import AXES, Campaign
 from antdrive.runs.campaigns.job import Job, NamedRobot, NamedTask, PlannerVariant, SweepCase
 from antdrive.runs.campaigns.resolving import OWN, SKIP, campaign_tasks, campaign_worlds, planner_variants
-from antdrive.sim.effects import idle_notes
 from antdrive.sim.forms import scenario_fields
+from antdrive.sim.idle_settings import idle_notes
 from antdrive.sim.log.record import canonical_hash
 from antdrive.sim.scenario import Scenario, key_of
 from antdrive.sim.written import Written, placed, unchosen

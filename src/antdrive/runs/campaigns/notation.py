@@ -15,7 +15,11 @@ from antdrive.sim.settings import SETTINGS
 from antdrive.worlds import list_worlds
 
 #: Option of each campaign key, for error messages.
-OPTIONS = {one.key: one.flag for one in SETTINGS.values() if one.flag} | {"robots": "--robot", "seeds": "--seeds"}
+OPTIONS = {one.key: one.flag for one in SETTINGS.values() if one.flag} | {
+    "planners": "--planner",
+    "robots": "--robot",
+    "seeds": "--seeds",
+}
 SOURCE = "the options"  # name of a campaign without a file in error messages
 
 

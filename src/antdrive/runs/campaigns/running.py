@@ -1,4 +1,4 @@
-"""One run of a campaign in a worker process: prepare, drive, measure, keep the log if wanted."""
+"""One run of a campaign in a worker process: drive, measure, keep the log if wanted."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, failed_row, run
 from antdrive.runs.pool import Done
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, run
-from antdrive.sim.scenario import Scenario
 
 Keep: TypeAlias = Literal["none", "failed", "all"]
 LOGS = "rollouts"  # folder of the kept logs
@@ -45,7 +44,7 @@ class Driving:
     def __call__(self, job: Job) -> Finished:
         """Make the run. An error of the planner or of antdrive is the run's result and does not end the campaign."""
         try:
-            done = run(prepare(job), progress=False)
+            done = run(job.case.scenario(job.seed), progress=False)
         except InputError:
             raise
         except PlannerError as error:
@@ -66,11 +65,6 @@ class Driving:
         except OSError as error:
             raise InputError(f"{log_path(job.key)}: cannot be written ({error.strerror or error})") from None
         return Finished(row)
-
-
-def prepare(job: Job) -> Scenario:
-    """Return the scenario of a run. Add here any preparation that runs in one world can share within a process."""
-    return job.case.scenario(job.seed)
 
 
 def log_path(key: str) -> str:

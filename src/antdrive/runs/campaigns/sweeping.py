@@ -148,7 +148,7 @@ def sweep(
             scheduler is gone.
     """
     campaign = campaign_of(campaign)
-    _check(campaign, jobs, dask, keep)
+    _validate(campaign, jobs, dask, keep)
     expansion = expansion or expand(campaign)
     parquet_library()
     with progress_bar(progress, "campaign") as report, opened(folder) as store:
@@ -183,14 +183,14 @@ def sweep(
     return SweepResults(Path(folder), table, size, made)
 
 
-def _check(campaign: Campaign, jobs: int | None, dask: str | None, keep: str | None) -> None:
+def _validate(campaign: Campaign, jobs: int | None, dask: str | None, keep: str | None) -> None:
     """Reject invalid arguments before any work."""
     if jobs is not None and (not isinstance(jobs, int) or jobs < 0):
         raise FieldError("jobs", f"must be a number of processes, or 0 for this process, got {jobs!r}")
     if dask is not None:
-        from antdrive.runs.cluster import check_address
+        from antdrive.runs.cluster import validate_address
 
-        check_address(dask)
+        validate_address(dask)
     if keep is not None and keep not in get_args(Keep):
         raise FieldError("keep", f"unknown {keep!r}; choose from {', '.join(get_args(Keep))}")
     if jobs == 0 and dask is None and campaign.entry.run_limit is not None:
@@ -209,7 +209,7 @@ def _runs(
             yield runs
     else:
         with Pool(cores() if jobs is None else jobs, **watched) as pool:
-            yield pool.each(work, todo, group=lambda job: job.case.place.world)
+            yield pool.each(work, todo)
 
 
 def calibrated(jobs: Iterable[Job]) -> list[Job]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,24 +31,7 @@ from antdrive.worlds import save_task
 PINNED = ("smoothing", "noise")
 
 
-@dataclass(frozen=True, eq=False)
-class Handover:
-    """A failing run under a name.
-
-    Attributes:
-        name: name of the scenario in the suite, and of its world file
-        failed: the attempt that failed
-        bound: the metric's bound that it crosses, if that is its failure
-        note: remark for readers; may be empty
-    """
-
-    name: str
-    failed: Attempt
-    bound: Bound | None = None
-    note: str = ""
-
-
-def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
+def write_suite(path: Path, failures: Sequence[Attempt], notes: Sequence[str] = (), bound: Bound | None = None) -> Path:
     """Write a suite, its worlds, and the robots that are not in the catalogue.
 
     The suite has no baselines: it passes as long as the scenarios fail in the same way. A scenario whose planner raises an
@@ -57,7 +39,9 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
 
     Args:
         path: the suite's file; its name ends in .drive.yaml
-        handovers: the failures, with different names
+        failures: the failing runs; their worlds' names differ, and name the scenarios
+        notes: a remark on each for readers, which may be empty; none by default
+        bound: the metric's bound that they cross, if that is their failure
 
     Returns:
         The suite's path.
@@ -67,16 +51,16 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
     """
     entries: dict[str, Any] = {}
     robots: dict[str, RobotSpec] = {}
-    for handover in handovers:
-        failed = handover.failed
-        world = Path("worlds") / f"{handover.name}.yaml"
+    for failed, note in zip(failures, notes or [""] * len(failures), strict=True):
+        name = failed.scenario.task.world.name
+        world = Path("worlds") / f"{name}.yaml"
         save_task(failed.scenario.task, path.parent / world)
         entry = _written(failed.scenario, str(world), path.parent, robots).plain()
-        entries[handover.name] = {
-            **({"note": handover.note} if handover.note else {}),
+        entries[name] = {
+            **({"note": note} if note else {}),
             **{key: value for key, value in entry.items() if key != "seed"},
             "seeds": [entry["seed"]],
-            **({"expect": expectation(failed.run, handover.bound)} if failed.run is not None else {}),
+            **({"expect": expectation(failed.run, bound)} if failed.run is not None else {}),
             "baseline": False,
         }
     text = yaml.safe_dump({"schema": 1, "scenarios": entries}, sort_keys=False, allow_unicode=True, width=110)

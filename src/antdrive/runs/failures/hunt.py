@@ -40,62 +40,35 @@ END = 2.5  # from start and goal to the walls behind them
 FREE = 5.5  # from the end walls to the centre of any cylinder
 RADII = (0.3, 1.5)
 CELL = 0.75
+MOST = 50  # cylinders
 
 
-@dataclass(frozen=True)
-class WorldSpace:
-    """All worlds with a given number of cylinders in a rectangle scaled by the robot's radius.
+def world_of(point: Floats, radius: float, name: str) -> Task:
+    """Return a world of a few cylinders in a rectangle scaled by the robot's radius, which the robot crosses in the middle.
 
-    A point of the space holds x, y and radius of each cylinder, each from 0 to 1. Lengths are rounded to millimetres, or
-    to 0.01 mm for small robots. The robot crosses the rectangle along its middle.
+    Lengths are rounded to millimetres, or to 0.01 mm for small robots.
 
-    Attributes:
-        count: number of cylinders
-        robot_radius: radius of the robot, the unit of all lengths [m]
-
-    Raises:
-        FieldError: no cylinder, or a radius that is not positive.
+    Args:
+        point: x, y and radius of each cylinder (N, 3), each from 0 to 1
+        radius: of the robot, the unit of all lengths [m]
+        name: of the world
     """
 
-    count: int
-    robot_radius: float
+    def metres(value: float) -> float:
+        return round(value, 3 if radius >= 0.1 else 5)
 
-    def __post_init__(self) -> None:
-        if not 1 <= self.count <= 50:
-            raise FieldError("count", f"must be from 1 to 50, got {self.count}")
-        if not self.robot_radius > 0:
-            raise FieldError("robot_radius", f"must be greater than 0, got {self.robot_radius:g}")
-
-    @property
-    def dimensions(self) -> int:
-        """The number of coordinates of a point."""
-        return 3 * self.count
-
-    def task(self, point: Floats, name: str) -> Task:
-        """Return the world of a point (D,), with start and goal."""
-        r = self.robot_radius
-        length, width = self._metres(LENGTH * r), self._metres(WIDTH * r)
-        low, high = self._range
-        values = low + np.asarray(point, dtype=np.float64).reshape(self.count, 3) * (high - low)
-        discs = tuple(Disc(self._metres(x), self._metres(y), self._metres(size)) for x, y, size in values.tolist())
-        middle = self._metres(width / 2)
-        return Task(
-            World(name, (0.0, 0.0, length, width), discs, "found by antdrive falsify"),
-            (self._metres(END * r), middle, 0.0),
-            (self._metres(length - END * r), middle),
-            goal_tolerance=self._metres(0.75 * r),
-            cell=float(f"{CELL * r:.2g}"),
-        )
-
-    @property
-    def _range(self) -> tuple[Floats, Floats]:
-        """The least and the largest x, y and radius of a cylinder [m]."""
-        r = self.robot_radius
-        low = np.array([FREE * r, 0.0, RADII[0] * r])
-        return low, np.array([(LENGTH - FREE) * r, WIDTH * r, RADII[1] * r])
-
-    def _metres(self, value: float) -> float:
-        return round(value, 3 if self.robot_radius >= 0.1 else 5)
+    length, width = metres(LENGTH * radius), metres(WIDTH * radius)
+    low = np.array([FREE * radius, 0.0, RADII[0] * radius])
+    high = np.array([(LENGTH - FREE) * radius, WIDTH * radius, RADII[1] * radius])
+    discs = tuple(Disc(*map(metres, values)) for values in (low + point * (high - low)).tolist())
+    middle = metres(width / 2)
+    return Task(
+        World(name, (0.0, 0.0, length, width), discs, "found by antdrive falsify"),
+        (metres(END * radius), middle, 0.0),
+        (metres(length - END * radius), middle),
+        goal_tolerance=metres(0.75 * radius),
+        cell=float(f"{CELL * radius:.2g}"),
+    )
 
 
 REHEARSED = 24  # rehearsed worlds for each run of the guided search
@@ -128,7 +101,7 @@ METHODS: Mapping[str, Callable[[Draw], Scenario | None]] = MappingProxyType(
 )
 
 
-def check_method(name: str) -> None:
+def validate_method(name: str) -> None:
     """Raise FieldError unless a search method has this name."""
     if name not in METHODS:
         raise FieldError("method", f"unknown {name!r:.40}; choose from {', '.join(METHODS)}")
@@ -271,17 +244,19 @@ def find_failures(
     Raises:
         FieldError: the method is unknown, or a number of cylinders or runs out of range.
     """
-    check_method(method)
+    validate_method(method)
     if budget < 1:
         raise FieldError("budget", f"must be at least 1, got {budget}")
-    space, rng = WorldSpace(obstacles, setup.robot.radius), np.random.default_rng([seed, obstacles])
+    if not 1 <= obstacles <= MOST:
+        raise FieldError("obstacles", f"must be from 1 to {MOST}, got {obstacles}")
+    rng = np.random.default_rng([seed, obstacles])
     setup = dataclasses.replace(setup, margin_choice=None)  # suites have the margin alone
     findings: list[Finding] = []
     number = driven = 0
     try:
         for number in range(1, budget + 1):
             numbered = dataclasses.replace(setup, seed=number)
-            tried = _next_world(space, rng, method, numbered, f"falsify-{seed}-{number}")
+            tried = _next_world(obstacles, rng, method, numbered, f"falsify-{seed}-{number}")
             done = Attempt.of(tried)
             driven += done.rollout is not None
             failure = _failure(done)
@@ -294,11 +269,11 @@ def find_failures(
     return Hunt(tuple(findings), number, driven)
 
 
-def _next_world(space: WorldSpace, rng: np.random.Generator, method: str, setup: Scenario, name: str) -> Scenario:
+def _next_world(count: int, rng: np.random.Generator, method: str, setup: Scenario, name: str) -> Scenario:
     """Return the configuration in the next world that has a path with the claimed clearance."""
 
     def draw() -> Scenario | None:
-        task = space.task(rng.random(space.dimensions), name)
+        task = world_of(rng.random((count, 3)), setup.robot.radius, name)
         if not feasible(task, setup.inflate):
             return None
         try:
@@ -310,7 +285,7 @@ def _next_world(space: WorldSpace, rng: np.random.Generator, method: str, setup:
         scenario = METHODS[method](draw)
         if scenario is not None:
             return scenario
-    raise FieldError("obstacles", f"no world of {space.count} cylinders with a path in {TRIES} draws; use fewer")
+    raise FieldError("obstacles", f"no world of {count} cylinders with a path in {TRIES} draws; use fewer")
 
 
 def _failure(done: Attempt) -> Failure | None:

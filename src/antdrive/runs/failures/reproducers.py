@@ -13,7 +13,7 @@ from typing import Any
 from antdrive.base.errors import amount
 from antdrive.base.tables import table
 from antdrive.runs.failures.failure import Attempt
-from antdrive.runs.failures.handover import Handover, renamed, run_elsewhere, write_suite
+from antdrive.runs.failures.handover import renamed, run_elsewhere, write_suite
 from antdrive.runs.failures.hunt import Finding, Hunt
 from antdrive.runs.failures.shrinker import Shrunk, shrink
 from antdrive.runs.suites.demands import Bound
@@ -82,10 +82,10 @@ def write_reproducers(
         if progress is not None:
             progress((k + 1) / (len(hunt.distinct) + 1))
     notes = [(done.failure() or one.failure).sentence for done, one in zip(small, hunt.distinct, strict=True)]
-    suite = _write(small, notes, folder)
+    suite = write_suite(folder / SUITE, small, notes)
     with tempfile.TemporaryDirectory(prefix="antdrive-falsify-") as place:
         found = [Attempt(finding.scenario, None) for finding in hunt.distinct]
-        originals = _write(found, [""] * len(found), Path(place))
+        originals = write_suite(Path(place) / SUITE, found)
         elsewhere = run_elsewhere(originals, suite)
     pairs = zip(elsewhere[: len(found)], elsewhere[len(found) :], strict=True)
     made = []
@@ -123,13 +123,7 @@ def write_reproducer(shrunk: Shrunk, name: str, folder: Path, *, bound: Bound | 
     note = f"shrunk from {shrunk.original.task.world.name}: {shrunk.summary}"
     small = Attempt.of(renamed(shrunk.scenario, name, note))
     failure = small.failure(bound)
-    handover = Handover(name, small, bound, (failure or shrunk.failure).sentence)
-    suite = write_suite(folder / f"{name}.drive.yaml", [handover])
+    sentence = (failure or shrunk.failure).sentence
+    suite = write_suite(folder / f"{name}.drive.yaml", [small], [sentence], bound)
     repeats = run_elsewhere(suite) == [small.fingerprint] and failure == shrunk.failure
     return small, suite, repeats
-
-
-def _write(failed: Sequence[Attempt], notes: Sequence[str], folder: Path) -> Path:
-    """Write the suite and the worlds of failures, each with a note; return the suite's path."""
-    named = zip(failed, notes, strict=True)
-    return write_suite(folder / SUITE, [Handover(one.scenario.task.world.name, one, note=note) for one, note in named])

@@ -301,37 +301,27 @@ class MarginSearch:
         yield f"smallest safe margin for {base.robot.name} at up to {base.robot.max_speed:g} m/s: {result}"
 
 
+WIDEST, RESOLUTION = 0.2, 0.005  # of the margins of `find_margin` [m]
+
+
 def find_margin(
-    drive: Callable[[float, int], Run],
-    seeds: Sequence[int],
-    *,
-    reserve: float = 0.005,
-    most: float = 0.2,
-    resolution: float = 0.005,
+    drive: Callable[[float, int], Run], seeds: Sequence[int], *, reserve: float = 0.005
 ) -> Iterator[MarginResult]:
     """Search by bisection for the smallest margin with which the drives of all seeds succeed.
 
     Yield the results as they are made; the smallest safe margin is the answer.
     """
-    if not 0 < resolution < most:
-        raise FieldError("resolution", f"must be greater than 0 and less than {most:g}, got {resolution:g}")
     hardest_first = list(seeds)
-    low, high = (
-        0,
-        math.ceil(most / resolution),
-    )  # in steps; the answer is at least low; high is safe or closes all worlds
-    result = _try_margin(high * resolution, drive, hardest_first, reserve)
-    yield result
-    if result.failed is not None:
-        return
+    low, step = 0, math.ceil(WIDEST / RESOLUTION)  # the answer is at least `low` steps
+    high = step + 1  # known to be safe, or to close all worlds
     while low < high:
-        middle = (low + high) // 2
-        result = _try_margin(middle * resolution, drive, hardest_first, reserve)
+        result = _try_margin(step * RESOLUTION, drive, hardest_first, reserve)
         yield result
         if result.failed is None:
-            high = middle
+            high = step
         else:
-            low = middle + 1
+            low = step + 1
+        step = (low + high) // 2
 
 
 def _try_margin(

@@ -5,24 +5,23 @@ Runs are kept in files, so an interrupted reproduction can resume.
 
 from __future__ import annotations
 
-import ast
 import csv
 import dataclasses
 import functools
+import gzip
 import hashlib
 import json
 import math
 import re
 import statistics
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
-from zipfile import BadZipFile
 
 import numpy as np
-import numpy.typing as npt
 
 import antdrive.planners
 import antdrive.runs.papers
@@ -50,10 +49,6 @@ from antdrive.runs.papers.paper_runs import PaperRun, drive_among, interleaved, 
 from antdrive.runs.pool import Pool, call_now, processes_for
 from antdrive.runs.statistics.intervals import medians_by_world
 
-HISTORY = ("best", "iteration_best", "iteration_mean", "arrived")
-NUMBERS = ("optimum", "cpu_s", "total", "concentration", "ants", "even", "close")  # in the order of `PaperRun`
-NONE = -1  # size of missing waypoints
-
 
 def runs_key(experiment: Experiment, seeds: int) -> str:
     """Return the key of an experiment's runs, including the source code; files with another key are ignored.
@@ -79,84 +74,51 @@ EVALUATING = ("claims", "arms")  # modules on which no run depends
 
 @functools.cache
 def code_hash() -> str:
-    """Return the hash of the code of worlds, planners and experiments, without comments, docstrings and `EVALUATING`."""
+    """Return the hash of the code of worlds, planners and experiments, without `EVALUATING`."""
     digest = hashlib.sha256()
     for package in (antdrive.worlds, antdrive.planners, antdrive.runs.papers):
         for folder in package.__path__:
             for path in sorted(Path(folder).rglob("*.py")):
-                if package is antdrive.runs.papers and path.stem in EVALUATING:
-                    continue
-                digest.update(code_of(path.read_bytes()))
+                if package is not antdrive.runs.papers or path.stem not in EVALUATING:
+                    digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-def code_of(source: bytes) -> bytes:
-    """Return what Python executes of a module: its syntax tree without statements that are only a string."""
-    tree = ast.parse(source)
-    for node in ast.walk(tree):
-        if isinstance(body := getattr(node, "body", None), list):
-            node.body = [  # type: ignore[attr-defined]
-                one for one in body if not (isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant))
-            ]
-    return ast.dump(tree).encode()
+KEPT = ("cells", "cost", "length", "waypoints", "work")  # of a plan; its field, options and planning time are lost
 
 
 def save_runs(runs: Sequence[PaperRun], path: Path, key: str) -> None:
-    """Write runs to a file; plans lose their fields, options and planning times."""
-    plans = [run.result for run in runs]
-    lines = [plan.waypoints for plan in plans]
-    arrays: dict[str, Any] = {
-        "key": np.array(key),
-        "seed": np.array([run.seed for run in runs]),
-        "world": np.array([run.world for run in runs]),
-        "numbers": np.array([[getattr(run, name) for name in NUMBERS] for run in runs]).reshape(-1, len(NUMBERS)),
-        "status": np.array([plan.status.name for plan in plans], dtype=np.str_),
-        "work": np.array([plan.work for plan in plans]),
-        "lengths": np.array([[plan.cost, math.nan if plan.length is None else plan.length] for plan in plans]).reshape(
-            -1, 2
-        ),
-        "cells": np.concatenate([np.empty((0, 2), dtype=np.int32), *(plan.cells for plan in plans)]),
-        "sizes": np.array([len(plan.cells) for plan in plans]),
-        "waypoints": np.concatenate([np.empty((0, 2)), *(line for line in lines if line is not None)]),
-        "waypoint_sizes": np.array([NONE if line is None else len(line) for line in lines]),
-        "history_sizes": np.array([len(plan.history) for plan in plans]),
-    }
-    for name in HISTORY:
-        arrays[name] = np.concatenate([getattr(History(), name), *(getattr(plan.history, name) for plan in plans)])
-    with atomic_write(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, **arrays)
+    """Write runs to a file."""
+    kept = [
+        {
+            **vars(run),
+            "result": {name: getattr(run.result, name) for name in KEPT},
+            "status": run.result.status.name,
+            "history": vars(run.result.history),
+        }
+        for run in runs
+    ]
+    with atomic_write(path) as temporary, gzip.open(temporary, "wt") as file:
+        json.dump({"key": key, "runs": kept}, file, default=lambda array: array.tolist())
 
 
 def load_runs(path: Path, key: str) -> list[PaperRun] | None:
     """Load the runs of a file; None if it is missing, unreadable or has another key."""
     try:
-        with open_regular(path) as opened, np.load(opened, allow_pickle=False) as file:
-            if str(file["key"]) != key:
-                return None
-            arrays = {name: file[name] for name in file.files}
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+        with open_regular(path) as opened, gzip.open(opened, "rt") as file:
+            found = json.load(file)
+        return [_run_of(**facts) for facts in found["runs"]] if found["key"] == key else None
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zlib.error):
         return None
-    cells = _parts(arrays["cells"], arrays["sizes"])
-    waypoints = _parts(arrays["waypoints"], np.maximum(arrays["waypoint_sizes"], 0))
-    histories = [_parts(arrays[name], arrays["history_sizes"]) for name in HISTORY]
-    runs = []
-    for k, (seed, world) in enumerate(zip(arrays["seed"], arrays["world"], strict=True)):
-        cost, length = (float(value) for value in arrays["lengths"][k])
-        plan = PlanResult(
-            status=PlanStatus[str(arrays["status"][k])],
-            cells=cells[k],
-            cost=cost,
-            length=None if math.isnan(length) else length,
-            waypoints=None if arrays["waypoint_sizes"][k] == NONE else waypoints[k],
-            work=int(arrays["work"][k]),
-            history=History(*(parts[k] for parts in histories)),
-        )
-        runs.append(PaperRun(int(seed), int(world), plan, *map(float, arrays["numbers"][k])))
-    return runs
 
 
-def _parts(joined: npt.NDArray[Any], sizes: npt.NDArray[np.int64]) -> list[npt.NDArray[Any]]:
-    return np.split(joined, np.cumsum(sizes)[:-1]) if len(sizes) else []
+def _run_of(result: dict[str, Any], status: str, history: dict[str, Any], **facts: Any) -> PaperRun:
+    cells, line = np.array(result["cells"], dtype=np.int32).reshape(-1, 2), result["waypoints"]
+    arrived = np.array(history.pop("arrived"), dtype=np.int64)
+    lengths = {name: np.array(values, dtype=np.float64) for name, values in history.items()}
+    arrays = {"cells": cells, "waypoints": None if line is None else np.array(line)}
+    plan = {**result, **arrays, "history": History(arrived=arrived, **lengths)}
+    return PaperRun(result=PlanResult(status=PlanStatus[status], **plan), **facts)
 
 
 T = TypeVar("T")
@@ -241,17 +203,17 @@ def reproduce(
     return Reproduction(measured, rows, verdicts, claims, files, kept)
 
 
-Settings = Mapping[str, Mapping[str, Mapping[str, Mapping[str, str]]]]  # by paper, arm and map
+ArmFacts = Mapping[str, Mapping[str, Mapping[str, Mapping[str, str]]]]  # by paper, arm and map
 
 
-def _settings(experiments: Sequence[Experiment]) -> Settings:
+def _settings(experiments: Sequence[Experiment]) -> ArmFacts:
     settings: dict[str, dict[str, dict[str, dict[str, str]]]] = {}
     for one in experiments:
         settings.setdefault(one.paper, {}).setdefault(one.name, {})[one.map] = arm_facts(one)
     return settings
 
 
-def _arms_of(claim: Claim, settings: Settings) -> dict[str, dict[str, str]]:
+def _arms_of(claim: Claim, settings: ArmFacts) -> dict[str, dict[str, str]]:
     """Return the settings of a claim's arms on its maps, by the arms' names."""
     maps: dict[str, list[str]] = {}
     for case in claim.cases:
@@ -290,7 +252,7 @@ def _all_runs(
         for group in _groups(experiments):
             first, count = group[0], len(group[0].seeds(seeds))
             words = f"{first.paper} {first.map} {first.group or first.name}"
-            path = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.npz"
+            path = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.json.gz"
             key = "\n".join(runs_key(experiment, seeds) for experiment in group)
             runs = load_runs(path, key)
             if runs is None:

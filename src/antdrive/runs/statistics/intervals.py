@@ -7,8 +7,9 @@ repetitions are no evidence and do not change an interval.
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -82,7 +83,8 @@ def resampled(world: Ints, resamples: int = RESAMPLES, seed: int = SEED) -> Iter
         yield weights
 
 
-def medians_by_world(
+def _by_world(
+    prepare: Callable[[Floats], Callable[[Ints], Floats]],
     values: Floats,
     world: Ints,
     resamples: int = RESAMPLES,
@@ -90,40 +92,54 @@ def medians_by_world(
     counted: Flags | None = None,
     confidence: float = CONFIDENCE,
 ) -> list[Interval]:
-    """Return percentile intervals for the median of each column of values (N, K), ignoring nan."""
-    statistics = np.full((resamples, values.shape[1]), np.nan)
+    """Return percentile intervals for a statistic of each column of values (N, K), ignoring nan.
+
+    Args:
+        prepare: takes values (n, k); returns a function of the draws (b, n) of a block of resamples to the statistics (b, k)
+        values: the values (N, K)
+        world: index of each run's world, (N,)
+        resamples: number of resamples
+        counted: the counted runs of each column (N, K); None: all
+        confidence: coverage of the intervals
+    """
+    found = np.full((resamples, values.shape[1]), np.nan)
     for rows, columns in _columns_alike(values, counted):
-        chosen = [_Sorted.of(values[rows, k]) for k in columns]
-        first = 0
+        statistic, first = prepare(values[rows][:, columns]), 0
         for weights in resampled(world[rows], resamples):
-            for k, column in zip(columns, chosen, strict=True):
-                statistics[first : first + len(weights), k] = column.medians(weights)
+            found[first : first + len(weights), columns] = statistic(weights)
             first += len(weights)
-    return [_percentiles(statistics[:, k], confidence) for k in range(values.shape[1])]
+    return [_percentiles(column, confidence) for column in found.T]
 
 
-def means_by_world(
-    values: Floats,
-    world: Ints,
-    resamples: int = RESAMPLES,
-    *,
-    counted: Flags | None = None,
-    confidence: float = CONFIDENCE,
-) -> list[Interval]:
-    """Return percentile intervals for the mean of each column of values (N, K), ignoring nan."""
-    statistics = np.full((resamples, values.shape[1]), np.nan)
-    for rows, columns in _columns_alike(values, counted):
-        known = ~np.isnan(values[rows][:, columns])
-        filled = np.where(known, values[rows][:, columns], 0.0)
-        first = 0
-        for weights in resampled(world[rows], resamples):
-            totals = weights @ known.astype(float)
-            with np.errstate(invalid="ignore"):
-                statistics[first : first + len(weights), columns] = (weights @ filled) / np.where(
-                    totals > 0, totals, np.nan
-                )
-            first += len(weights)
-    return [_percentiles(statistics[:, k], confidence) for k in range(values.shape[1])]
+def _means(values: Floats) -> Callable[[Ints], Floats]:
+    known = ~np.isnan(values)
+    filled = np.where(known, values, 0.0)
+
+    def means(weights: Ints) -> Floats:
+        totals = weights @ known.astype(float)
+        with np.errstate(invalid="ignore"):
+            return np.asarray((weights @ filled) / np.where(totals > 0, totals, np.nan))
+
+    return means
+
+
+def _medians(values: Floats) -> Callable[[Ints], Floats]:
+    """Return a function of draws to medians: of each resample a position in a cumulative sum of sorted draws."""
+    orders = [np.argsort(column, kind="stable")[: np.count_nonzero(~np.isnan(column))] for column in values.T]
+
+    def median(weights: Ints, column: Floats, order: Ints) -> Floats:
+        if not len(order):
+            return np.full(len(weights), np.nan)
+        running = np.cumsum(weights[:, order], axis=1)
+        total = running[:, -1:]
+        lower, upper = (2 * running >= total).argmax(axis=1), (2 * running > total).argmax(axis=1)
+        return np.where(total[:, 0] > 0, (column[order[lower]] + column[order[upper]]) / 2, np.nan)
+
+    return lambda weights: np.stack([median(weights, *one) for one in zip(values.T, orders, strict=True)], axis=1)
+
+
+#: Percentile intervals for the mean and for the median of each column of values, see `_by_world`.
+means_by_world, medians_by_world = functools.partial(_by_world, _means), functools.partial(_by_world, _medians)
 
 
 def _columns_alike(values: Floats, counted: Flags | None) -> Iterator[tuple[Ints, Ints]]:
@@ -135,28 +151,6 @@ def _columns_alike(values: Floats, counted: Flags | None) -> Iterator[tuple[Ints
     for k, mask in enumerate(masks.T):
         if mask.any():
             yield np.flatnonzero(mask), np.flatnonzero(inverse.ravel() == k)
-
-
-class _Sorted:
-    """A column's sorted values: the median of every resample is a position in a cumulative sum of weights."""
-
-    def __init__(self, values: Floats, order: Ints) -> None:
-        self.values = values
-        self.order = order
-
-    @classmethod
-    def of(cls, column: Floats) -> _Sorted:
-        order = np.argsort(column, kind="stable")[: int((~np.isnan(column)).sum())]
-        return cls(column[order], order)
-
-    def medians(self, weights: Ints) -> Floats:
-        """Return the median of each resample; nan without values."""
-        if not len(self.values):
-            return np.full(len(weights), np.nan)
-        running = np.cumsum(weights[:, self.order], axis=1)
-        total = running[:, -1:]
-        lower, upper = (2 * running >= total).argmax(axis=1), (2 * running > total).argmax(axis=1)
-        return np.where(total[:, 0] > 0, (self.values[lower] + self.values[upper]) / 2, np.nan)
 
 
 def _percentiles(statistics: Floats, confidence: float) -> Interval:

@@ -13,8 +13,7 @@ import numpy.typing as npt
 
 from antdrive.base.errors import FieldError, few
 from antdrive.base.types import Flags, Floats
-from antdrive.sim.settings import SETTING_COLUMNS
-from antdrive.sim.settings import SETTINGS as DECLARED
+from antdrive.sim.settings import SETTING_COLUMNS, SETTINGS
 
 LISTED = 20  # most values listed in an error
 NONE = "none"  # represents a missing value
@@ -86,9 +85,9 @@ def _fits(value: Any, test: str | tuple[float, float]) -> bool:
 #: Columns of the place of a run.
 PLACE = ("world", "world_hash", "task")
 #: Columns of a run's configuration besides planner and place. A table may lack some.
-SETTINGS = ("robot", "robot_hash", *(name for name in SETTING_COLUMNS if name != "seed"))
+CONFIGURATION = ("robot", "robot_hash", *(name for name in SETTING_COLUMNS if name != "seed"))
 #: Columns of the robot's knowledge of the world and of its pose.
-SENSING = tuple(one.column for one in DECLARED.values() if one.setting.group == "Sensing")
+SENSING = tuple(one.column for one in SETTINGS.values() if one.setting.group == "Sensing")
 #: The margin as requested, such as "auto", and the one used: runs are paired by the first.
 ASKED, DRIVEN = "margin_asked", "margin"
 #: A world's own cell size is not a setting of the campaign, so it does not separate seeds.
@@ -124,7 +123,7 @@ class RunTable:
     def settings(self) -> tuple[str, ...]:
         """The columns of a run's settings; of the two margins only the requested one."""
         return tuple(
-            name for name in SETTINGS if name in self.columns and not (name == DRIVEN and ASKED in self.columns)
+            name for name in CONFIGURATION if name in self.columns and not (name == DRIVEN and ASKED in self.columns)
         )
 
     def texts(self, name: str) -> list[str]:
@@ -179,7 +178,7 @@ def merged(tables: Mapping[str, RunTable]) -> RunTable:
     """
     if len(tables) == 1:
         return next(iter(tables.values()))
-    _check(tables)
+    _validate(tables)
     names = list(dict.fromkeys(name for table in tables.values() for name in table.columns))
     columns = {
         name: [value for table in tables.values() for value in table.columns.get(name, [None] * len(table))]
@@ -194,8 +193,8 @@ def merged(tables: Mapping[str, RunTable]) -> RunTable:
     return RunTable({**columns, FOLDER: folders})
 
 
-def _check(tables: Mapping[str, RunTable]) -> None:
-    described = (*PLACE, *SETTINGS)
+def _validate(tables: Mapping[str, RunTable]) -> None:
+    described = (*PLACE, *CONFIGURATION)
     every = [name for name in described if any(name in table for table in tables.values())]
     for folder, table in tables.items():
         lacks = [name for name in every if name not in table]
@@ -208,7 +207,7 @@ def _check(tables: Mapping[str, RunTable]) -> None:
 
 def _in_several(table: RunTable, folders: list[str]) -> set[str]:
     """Return the planners with runs of one instance in two folders."""
-    described = [name for name in (*PLACE, *SETTINGS, "seed", "planner") if name in table]
+    described = [name for name in (*PLACE, *CONFIGURATION, "seed", "planner") if name in table]
     if ASKED in described:
         described.remove(DRIVEN)
     first: dict[tuple[str, ...], str] = {}

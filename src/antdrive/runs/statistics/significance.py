@@ -102,13 +102,9 @@ def sums_by_world(values: Floats, world: Ints, worlds: int) -> Floats:
 
 
 def holm(p_values: Floats) -> Floats:
-    """Return Holm's adjusted p-values (Holm 1979), (K,); nan stays nan and does not count.
-
-    The k-th smallest of m is multiplied by m + 1 - k; adjusted values never decrease with k.
-    """
-    adjusted = np.full(len(p_values), np.nan)
-    known = np.flatnonzero(~np.isnan(p_values))
-    order = known[np.argsort(p_values[known], kind="stable")]
-    larger = np.arange(len(order), 0, -1) * p_values[order]
-    adjusted[order] = np.minimum(np.maximum.accumulate(larger), 1.0) if len(order) else larger
+    """Return Holm's adjusted p-values (Holm 1979), (K,); nan stays nan and does not count."""
+    adjusted, known = np.full(len(p_values), np.nan), ~np.isnan(p_values)
+    if known.any():
+        tests = statistics_library("statsmodels.stats.multitest")
+        adjusted[known] = tests.multipletests(p_values[known], method="holm")[1]
     return adjusted

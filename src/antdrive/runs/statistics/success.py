@@ -117,18 +117,13 @@ class StepCurve(NamedTuple):
     x: Floats  # positions of the steps, ascending, (M,)
     fraction: Floats  # value from there on, 0 to 1, (M,)
 
-    def at(self, x: float) -> float:
-        """Return the curve's value."""
-        place = int(np.searchsorted(self.x, x, side="right"))
-        return float(self.fraction[place - 1]) if place else 0.0
-
 
 def performance_profiles(cost: Floats) -> list[StepCurve]:
     """Return for each planner the fraction of instances solved at no more than x times the best cost.
 
     Performance profiles after Dolan and Moré (2002). An instance that no planner solves counts as unsolved by all.
     """
-    _check(cost)
+    _validate(cost)
     if np.nanmin(cost, initial=0.0) < 0:
         raise FieldError("cost", "must not be negative: ratios to the best would be undefined")
     best = np.where(np.isnan(cost), np.inf, cost).min(axis=1, keepdims=True)
@@ -140,7 +135,7 @@ def performance_profiles(cost: Floats) -> list[StepCurve]:
 
 def distributions(values: Floats) -> list[StepCurve]:
     """Return for each planner the fraction of instances solved with a value of at most x."""
-    _check(values)
+    _validate(values)
     curves = []
     for column in values.T:
         x, counts = np.unique(column[np.isfinite(column)], return_counts=True)
@@ -148,6 +143,6 @@ def distributions(values: Floats) -> list[StepCurve]:
     return curves
 
 
-def _check(values: Floats) -> None:
+def _validate(values: Floats) -> None:
     if values.ndim != 2 or not values.size:
         raise FieldError("values", f"must be instances by planners, at least one of each; got shape {values.shape}")

@@ -341,7 +341,7 @@ def _compare(
     assert tolerance is not None
     now, then = metric(rollout), baseline.metric(name)
     unit = "" if metric.unit == "1" else f" {metric.unit}"
-    if math.isnan(now) and rollout.record.exploring:
+    if math.isnan(now) and rollout.record.mapless:
         return  # old baselines compare the first plan of a mapless robot with the optimum
     if not math.isfinite(now):
         faults.append(f"{name}: {now:g}, in the baseline {then:.6g}{unit}")

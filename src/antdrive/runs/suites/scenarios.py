@@ -58,6 +58,7 @@ def select(words: Sequence[str], only: str | None = None) -> list[SuiteCase]:
                 selected.setdefault((case.suite, case.id), case)
     for case in selected.values():
         case.written.check_names(case.suite.parent, case.error)
+        case.written.check_settings(case.error)
     if not selected:
         raise input_error("--only", f"no test of {' '.join(words)} matches {only!r}")
     return list(selected.values())

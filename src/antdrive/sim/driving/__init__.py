@@ -1,1 +1,1 @@
-"""The drive loop and its parts: localisation, guidance, control rules, replanning, exploration and replay."""
+"""The drive loop and its parts: localisation, guidance, control rules, replanning and exploration."""

@@ -11,13 +11,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Point, Pose
 from antdrive.base.plane import format_position
-from antdrive.base.records import derived
+from antdrive.base.records import unchecked_copy
 from antdrive.planners import Query
 from antdrive.planners.graph.search import reachable
 from antdrive.robots import TrackedPath
@@ -91,7 +92,7 @@ def closed_cells(
     return closed
 
 
-def close_route(discs: list[Disc], tracked: TrackedPath, arc: float, reach: float, inflate: float) -> bool:
+def obstructs_route(discs: list[Disc], tracked: TrackedPath, arc: float, reach: float, inflate: float) -> bool:
     """Return whether a disc is closer than `inflate` [m] to the route within `reach` [m] beyond an arc length [m]."""
     ahead = np.arange(arc, min(arc + reach, tracked.length), 0.1)
     if not discs or not len(ahead):
@@ -113,7 +114,26 @@ def with_obstacles(task: Task, discs: Sequence[Disc]) -> Task:
         return task
     more = np.array([(disc.x, disc.y, disc.radius) for disc in discs])
     world = PointWorld.of(task.world.name, task.world.bounds, np.concatenate((task.world.discs, more)))
-    return derived(task, world=world)
+    return unchecked_copy(task, world=world)
+
+
+class Search(NamedTuple):
+    """Failed searches in a row behind the same standing movers."""
+
+    failures: int = 0
+    since: float = -math.inf  # time of the first [s]
+    due: float = -math.inf  # earliest time of the next [s]
+    movers: npt.NDArray[np.int64] = np.empty(0, dtype=np.int64)  # those that stood still at the first (M,)
+    places: Floats = np.empty((0, 2))  # their positions then (M, 2) [m]
+
+
+class Gap(NamedTuple):
+    """Gap beside a standing mover that is too narrow for avoidance."""
+
+    at: Point  # the mover's position [m]
+    width: float  # clearance of plans from its surface [m]
+    passed: bool = False  # whether the robot passes it at the safety margin
+    refused: bool = False  # whether the robot had to wait again while it passed
 
 
 class Blockage:
@@ -123,128 +143,119 @@ class Blockage:
     failure, the wait before the next search doubles.
 
     Attributes:
-        failures: failed searches in a row
+        failed_searches: those since a route was last found
         reason: which mover blocks the robot and where, once the robot's patience is over; else empty
     """
 
     def __init__(
-        self, task: Task, grid: Grid, predictor: PerceivedMovers, hz: int, policy: ReplanPolicy, keeps: float
+        self, task: Task, grid: Grid, predictor: PerceivedMovers, hz: int, policy: ReplanPolicy, clearance: float
     ) -> None:
-        self.failures, self.reason = 0, ""
-        self._keeps = keeps
-        self._gaps: dict[int, tuple[float, float]] = {}  # positions of the noted movers
-        self._widths: dict[int, float] = {}  # clearance of plans from their surfaces [m]
-        self._passed: set[int] = set()  # noted movers that the robot passes at the safety margin
-        self._refused: set[int] = set()  # passed movers beside which it had to wait again
-        self._all = np.empty((0, 2))  # positions of all movers when the last one was noted
+        self.failed_searches, self.reason = Search(), ""
+        self._gaps: dict[int, Gap] = {}  # by mover
+        self._all = np.empty((0, 2))  # positions of all movers when the last gap was noted
         self._task, self._grid, self._predictor, self._hz = task, grid, predictor, hz
-        self._interval, self._patience = policy.min_interval, policy.patience
-        self._since = self._due = -math.inf
-        self._standing: npt.NDArray[np.int64] = np.empty(0, dtype=np.int64)
-        self._places = np.empty((0, 2))
+        self._policy, self._clearance = policy, clearance
 
     def pause(self, tick: int, position: Point) -> bool:
         """Return whether a search now would repeat the last one."""
-        if not self.failures:
+        if not self.failed_searches.failures:
             return False
         if not self._still_there(tick, position):
             self.route_found()
             return False
-        return tick / self._hz < self._due
+        return tick / self._hz < self.failed_searches.due
 
     def route_found(self) -> None:
-        """Reset the count of failed searches: a route exists, or may open soon."""
-        self.failures = 0
+        """Forget failed searches: a route exists, or may open soon."""
+        self.failed_searches = Search()
 
     def failed(self, tick: int, pose: Pose) -> None:
         """Count a search from a pose [m, m, rad] that found no route."""
         now, position = tick / self._hz, pose[:2]
         standing = self.standing(tick, position)
-        if self.failures and not self._closed(tick, pose, np.intersect1d(standing, self._standing)):
-            self.route_found()
-        if not self.failures:
+        last, interval, patience = self.failed_searches, self._policy.min_interval, self._policy.patience
+        if last.failures and not self._closed(tick, pose, np.intersect1d(standing, last.movers)):
+            last = Search()
+        if not last.failures:
             if not self._closed(tick, pose, standing):
+                self.route_found()
                 return
-            self._since, self._standing = now, standing
-            self._places = self._predictor.perceived(tick, position)[1][standing]
-        self.failures += 1
-        if now - self._since >= self._patience:
+            places = self._predictor.perceived(tick, position)[1][standing]
+            last = Search(since=now, movers=standing, places=places)
+        due = min(now + interval * 2.0 ** min(last.failures, 30), max(last.since + patience, now + interval))
+        self.failed_searches = last._replace(failures=last.failures + 1, due=due)
+        if now - last.since >= patience:
             self.reason = self._sentence(tick, pose)
-        wait = self._interval * 2.0 ** min(self.failures - 1, 30)
-        self._due = min(now + wait, max(self._since + self._patience, now + self._interval))
 
     def may_pass(self, tick: int, position: Point) -> bool:
         """Allow passing noted movers at the safety margin after a failure, if all movers have stood still since."""
-        if not self.failures:
+        if not self.failed_searches.failures:
             return False
-        noted = np.setdiff1d(self._noted(tick, position), [*self._passed, *self._refused])
+        noted = [m for m, gap in self._noted(tick, position).items() if not (gap.passed or gap.refused)]
         perceived, positions = self._predictor.perceived(tick, position)
-        if not len(noted) or not np.isin(perceived, self.standing(tick, position)).all():
+        if not noted or not np.isin(perceived, self.standing(tick, position)).all():
             return False
         if len(positions) != len(self._all):  # a new mover is perceived
             return False
         if not (np.hypot(*(positions - self._all)[perceived].T) <= STILL).all():
             return False
-        self._passed |= set(noted.tolist())
+        self._gaps |= {m: self._gaps[m]._replace(passed=True) for m in noted}
         return True
 
     def note_gaps(self, tick: int, position: Point, tracked: TrackedPath, arc: float) -> None:
         """Note the standing movers that the route ahead passes too closely for avoidance; noted ones need more each time."""
         standing = self.standing(tick, position)
-        if self._keeps <= self._grid.inflate or not len(standing):
+        if self._clearance <= self._grid.inflate or not len(standing):
             return
         ahead = np.arange(arc, min(arc + GAP_RANGE, tracked.length), GAP_STEP)
         points, positions = points_at(tracked, ahead), self._predictor.perceived(tick, position)[1]
         noted = self._noted(tick, position)
         for m in standing.tolist():
             gap = np.hypot(*(points - positions[m]).T).min(initial=np.inf) - self._predictor.radius_of(m)
-            width = self._widths[m] if m in noted else self._keeps
-            if gap < width + GAP_SLACK:
-                self._widths[m] = max(width, gap + GAP_SLACK)
-                self._gaps[m] = (float(positions[m, 0]), float(positions[m, 1]))
+            last = noted.get(m, Gap((math.nan, math.nan), self._clearance))
+            if gap < last.width + GAP_SLACK:
+                at, width = (float(positions[m, 0]), float(positions[m, 1])), max(last.width, gap + GAP_SLACK)
+                self._gaps[m] = Gap(at, width, refused=last.passed or last.refused)
                 self._all = positions
-                if m in self._passed:
-                    self._passed.remove(m)
-                    self._refused.add(m)
 
-    def _noted(self, tick: int, position: Point) -> npt.NDArray[np.int64]:
-        """Return the noted movers (N,) that stand where they stood."""
+    def _noted(self, tick: int, position: Point) -> dict[int, Gap]:
+        """Return the gaps beside noted movers that stand where they stood; forget the others."""
         positions = self._predictor.perceived(tick, position)[1]
-        self._gaps = {m: at for m, at in self._gaps.items() if np.hypot(*(positions[m] - at)) <= STILL}
-        self._passed &= self._gaps.keys()
-        self._refused &= self._gaps.keys()
-        return np.array(sorted(self._gaps), dtype=np.int64)
+        self._gaps = {m: gap for m, gap in self._gaps.items() if np.hypot(*(positions[m] - gap.at)) <= STILL}
+        return self._gaps
 
     def discs(self, tick: int, ends: Floats, only: npt.NDArray[np.int64] | None = None) -> list[Disc]:
         """Return the noted movers as discs, enlarged so that plans keep the clearance of avoidance."""
         noted = self._noted(tick, (float(ends[0, 0]), float(ends[0, 1])))
-        wanted = np.setdiff1d(noted if only is None else np.intersect1d(noted, only), list(self._passed))
         discs: list[Disc] = []
-        for m in wanted:
-            wider = self._widths[int(m)] - self._grid.inflate
-            discs += covered_discs(self._predictor, tick, ends, 0.0, self._grid, np.array([m]), wider)
+        for m, gap in sorted(noted.items()):
+            if not gap.passed and (only is None or m in only):
+                wider = gap.width - self._grid.inflate
+                discs += covered_discs(self._predictor, tick, ends, 0.0, self._grid, np.array([m]), wider)
         return discs
 
     def clearance_reduction(self, tick: int, position: Point) -> Floats:
         """Return how much closer than usual the robot may pass each perceived mover (P,) [m]."""
         perceived = self._predictor.within_range(tick, position)
-        if not self._passed:
+        if not any(gap.passed for gap in self._gaps.values()):
             return np.zeros(len(perceived))
-        passed = np.isin(perceived, self._noted(tick, position)) & np.isin(perceived, list(self._passed))
-        return np.where(passed, self._keeps - self._grid.inflate, 0.0)
+        passed = [m for m, gap in self._noted(tick, position).items() if gap.passed]
+        return np.where(np.isin(perceived, passed), self._clearance - self._grid.inflate, 0.0)
 
     def standing(self, tick: int, position: Point) -> npt.NDArray[np.int64]:
         """Return the perceived movers (S,) that are predicted to stand still for as long as the robot's patience."""
         perceived = self._predictor.within_range(tick, position)
-        ahead = np.linspace(0.0, self._patience, 1 + math.ceil(self._patience / STANDING_STEP))
+        patience = self._policy.patience
+        ahead = np.linspace(0.0, patience, 1 + math.ceil(patience / STANDING_STEP))
         positions, _ = self._predictor.predict(tick, position, ahead)
         return np.asarray(perceived[np.hypot(*np.moveaxis(positions - positions[0], -1, 0)).max(axis=0) <= STILL])
 
     def _still_there(self, tick: int, position: Point) -> bool:
         """Return whether all movers of the first failure are perceived where they stood."""
         perceived, positions = self._predictor.perceived(tick, position)
-        near = np.hypot(*(positions[self._standing] - self._places).T) <= STILL
-        return bool(near.all() and np.isin(self._standing, perceived).all())
+        _, _, _, movers, places = self.failed_searches
+        near = np.hypot(*(positions[movers] - places).T) <= STILL
+        return bool(near.all() and np.isin(movers, perceived).all())
 
     def _closed(self, tick: int, pose: Pose, movers: npt.NDArray[np.int64]) -> bool:
         """Return whether these movers alone close every route that is open without them."""
@@ -262,17 +273,18 @@ class Blockage:
     def _sentence(self, tick: int, pose: Pose) -> str:
         """Name the nearest mover that alone blocks the robot, else the nearest of all, with its position and the time."""
         _, positions = self._predictor.perceived(tick, pose[:2])
-        order = self._standing[np.argsort(np.hypot(*(positions[self._standing] - pose[:2]).T), kind="stable")]
+        movers = self.failed_searches.movers
+        order = movers[np.argsort(np.hypot(*(positions[movers] - pose[:2]).T), kind="stable")]
         alone = (m for m in order.tolist() if self._way(tick, pose, order[order != m]))
         mover = next(alone, int(order[0]))
         at = format_position(self._task.frame, *positions[mover].tolist())
         narrow = mover in self._noted(tick, pose[:2]) and self._way(tick, pose, order, narrow=True)
         closes = (
-            f"leaves a gap too narrow for local avoidance, which keeps the robot's centre {self._keeps:.3g} m from it"
+            f"leaves a gap too narrow for local avoidance, which keeps the robot's centre {self._clearance:.3g} m from it"
             if narrow
             else "closes the way"
         )
         return (
             f"{self._predictor.name_of(mover)} stands still at {at} and {closes}; "
-            f"no route to the goal for {self._patience:g} s, in {self.failures} attempts"
+            f"no route to the goal for {self._policy.patience:g} s, in {self.failed_searches.failures} attempts"
         )

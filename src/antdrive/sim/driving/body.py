@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Plant(Protocol):
-    """Robot that executes twists: in physics (`Bullet`), exactly (`Kinematic`), or from a log (`Logged`)."""
+    """Robot that executes twists: in physics (`Bullet`) or exactly (`Kinematic`)."""
 
     state: State  # true pose and velocity
 

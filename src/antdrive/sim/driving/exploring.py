@@ -16,7 +16,7 @@ import numpy as np
 
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.kernel_cache import clock
-from antdrive.base.records import derived
+from antdrive.base.records import unchecked_copy
 from antdrive.planners import PlanResult, PlanStatus, Query, smooth
 from antdrive.robots import RobotSpec, TrackedPath, Twist, outline_of
 from antdrive.robots.control.pursuit import obstacles_around
@@ -29,18 +29,7 @@ from antdrive.sim.driving.recovery import TRAIL, Recovery, ScanTurn
 from antdrive.sim.driving.route_planner import RoutePlanner, bounds_of
 from antdrive.sim.driving.rules import ROTATING, braked
 from antdrive.sim.driving.survey import PATIENCE, ROUTE_CHECK_STEP, RoutePoints, Survey
-from antdrive.sim.policy import (
-    BACKED,
-    DISCOVERED,
-    HELD,
-    LOST,
-    MADE_ROOM,
-    MISSED,
-    SCANNED,
-    STALLED,
-    STRAYED,
-    ReplanPolicy,
-)
+from antdrive.sim.policy import ReplanPolicy, Trigger
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
 
@@ -235,7 +224,7 @@ class Exploration(RouteGuide):
         line = np.empty((len(points) + 2, 2))
         line[0], line[1:-1], line[-1] = pose[:2], points, self._task.goal
         discs = _kernels_hits.near_polyline(line, seen, grid.inflate + CORRIDOR)
-        near = derived(task, world=SEEN.among(bounds, discs))
+        near = unchecked_copy(task, world=SEEN.among(bounds, discs))
         route = smooth(answer, grid, with_obstacles(near, avoided), kind=self._routes.smoothing)
         tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
         self._points = RoutePoints.of(route, near.world, grid.inflate)
@@ -263,7 +252,7 @@ class Exploration(RouteGuide):
             discs = self._movers.without_trails(discs, pose)
         ends = np.array((pose[:2], self._task.goal))
         discs = _kernels_hits.beside(discs, ends, COVERS)  # hits that cover one of them are map errors
-        known = derived(self._task, world=SEEN.among(bounds, discs), start=pose)
+        known = unchecked_copy(self._task, world=SEEN.among(bounds, discs), start=pose)
         self._known_as = key, known
         return known
 
@@ -273,7 +262,7 @@ class Exploration(RouteGuide):
         tracked = self._routes.prepared(route, world, margin, SAMPLES, indexed=False)
         foot, tuning = robot.footprint, tracked.tuning
         give = FORGIVING + CORNERED * (robot.radius - foot.inner_radius)
-        return derived(
+        return unchecked_copy(
             tracked,
             tuning=tuning._replace(
                 lookahead_clearance=tuning.lookahead_clearance - give,
@@ -298,7 +287,7 @@ class Exploration(RouteGuide):
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
         """Return a new path to a missed goal, unless a search or scan turn is under way."""
-        return None if self.may_wait else self.replan(tick, pose, MISSED)
+        return None if self.may_wait else self.replan(tick, pose, Trigger.MISSED)
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Return the trigger of a new route; empty if none is due."""
@@ -307,20 +296,20 @@ class Exploration(RouteGuide):
             self._movers.observe(tick, pose, waiting)
         recovery = self._recovery
         if recovery.scan_turn is not None:
-            return SCANNED if recovery.scan_turn.done else ""
+            return Trigger.SCAN_TURN if recovery.scan_turn.done else ""
         if self.lost:
-            return LOST if now - self._planned_at >= INTERVAL else ""
+            return Trigger.LOST if now - self._planned_at >= INTERVAL else ""
         turns = tracked.route.turns is not None
         recovery.note_progress(now, pose, waiting=waiting, backwards=tracked.backwards, turns=turns)
         if tracked.route is recovery.route:
             over = tracked.length - arc < 2 * TRAIL or recovery.stalled(now)
-            return (BACKED if tracked.backwards else MADE_ROOM) if over else ""
+            return (Trigger.BACKED_OFF if tracked.backwards else Trigger.MADE_ROOM) if over else ""
         if now - self._planned_at < INTERVAL:
             return ""
         if recovery.stalled(now):
-            return STALLED
+            return Trigger.STALLED
         if recovery.held(now, pose):
-            return HELD
+            return Trigger.CONSTRAINED
         if self._movers is not None and now - self._planned_at >= self._policy.min_interval:
             due = self._movers.trigger(tick, pose, tracked, arc)
             if due:
@@ -332,20 +321,20 @@ class Exploration(RouteGuide):
         path = tracked.samples.xy, tracked.samples.arc
         place, hit = self.survey.check(path, self._points, arc, int(arc / ROUTE_CHECK_STEP))
         if math.dist(place, pose[:2]) > self._policy.max_deviation:
-            return STRAYED
-        return DISCOVERED if hit else ""
+            return Trigger.STRAYED
+        return Trigger.DISCOVERED if hit else ""
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """Return a new path from a pose; None if there is none, or a scan turn comes first."""
         now, spent = tick / self._hz, clock()
         self._planned_at, self._tick = now, tick
-        if trigger in (STALLED, HELD, BACKED, MADE_ROOM, SCANNED):
+        if trigger in (Trigger.STALLED, Trigger.CONSTRAINED, Trigger.BACKED_OFF, Trigger.MADE_ROOM, Trigger.SCAN_TURN):
             recovers, way = self._recovered(now, pose, trigger)
             if way is not None:
                 self.note(now, trigger, spent(), 0, way.length, way.route.xy)
             if recovers:
                 return way
-        if self._failures >= PATIENCE and trigger != SCANNED:
+        if self._failures >= PATIENCE and trigger != Trigger.SCAN_TURN:
             self._failures = 0
             self.survey.reset(pose)
         grid, plan, avoided = self._plan_around(tick, pose, trigger)
@@ -366,18 +355,18 @@ class Exploration(RouteGuide):
     def _recovered(self, now: float, pose: Pose, trigger: str) -> tuple[bool, TrackedPath | None]:
         """Start a recovery; return whether it replaces planning, and the path that it follows."""
         recovery = self._recovery
-        if trigger == SCANNED:
+        if trigger == Trigger.SCAN_TURN:
             recovery.end_scan_turn(now, pose)
             return False, None
-        if trigger in (BACKED, MADE_ROOM):
+        if trigger in (Trigger.BACKED_OFF, Trigger.MADE_ROOM):
             recovery.note_rest(now, pose)
-        if trigger == STALLED:
+        if trigger == Trigger.STALLED:
             recovery.note_stall(now, pose)
-        if (trigger != STALLED or recovery.held_by_unknown(pose)) and recovery.begin_scan_turn(pose):
+        if (trigger != Trigger.STALLED or recovery.held_by_unknown(pose)) and recovery.begin_scan_turn(pose):
             return True, None
-        if trigger == HELD:
+        if trigger == Trigger.CONSTRAINED:
             return True, None
-        route = recovery.escape(pose) if trigger == STALLED else None
+        route = recovery.escape(pose) if trigger == Trigger.STALLED else None
         if route is None:
             return False, None
         way = self._prepare(route, SEEN.among(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)

@@ -29,12 +29,12 @@ class MoverTracking:
 
     def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
         lidar = lidar.at(hz)
-        self.tracker, self.tick = MoverTracker(lidar, None, pose_xy, pose_yaw), 0
+        self.tracker, self.tick = MoverTracker(lidar, pose_xy, pose_yaw), 0
         self.sight, self.reach = 0.0, min(lidar.max_range, MAP_CELL / lidar.spacing)
         self._last: tuple[Pose, Floats, npt.NDArray[np.bool_]] | None = None
         self._known_corners: Floats | None = None
         self._hz, self._spacing, self._lidar = hz, lidar.spacing, lidar
-        self._settle = max(2, round(self.tracker.policy.settle * lidar.rate))
+        self._settle = max(2, round(self.tracker.rules[False].settle * lidar.rate))
         self._log: list[tuple[int, TrackedMovers]] = []
 
     def read(self, ground: Ground, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:

@@ -16,9 +16,9 @@ import numpy.typing as npt
 from antdrive.base import Bounds, Floats, Point, Pose
 from antdrive.planners import PlanResult
 from antdrive.robots import RobotSpec, TrackedPath
-from antdrive.sim.driving.blockage import MIN_RADIUS, Blockage, close_route, covered_discs, points_at
+from antdrive.sim.driving.blockage import MIN_RADIUS, Blockage, covered_discs, obstructs_route, points_at
 from antdrive.sim.driving.perceived_movers import STANDS, PerceivedMovers, Tracked
-from antdrive.sim.policy import OBSTRUCTED, TRAFFIC, WAITED, ReplanPolicy
+from antdrive.sim.policy import ReplanPolicy, Trigger
 from antdrive.worlds import Disc, Grid, World, rasterise
 
 if TYPE_CHECKING:
@@ -250,18 +250,18 @@ class MoversAhead:
         policy = self._policy
         if tick / self._hz - self._waiting_since >= policy.max_wait:
             self.reset_wait()
-            return WAITED
+            return Trigger.WAITED
         if self._replanned[-REPLANS] - self._nearest >= PROGRESS and self._obstructed(tick, pose, tracked, arc):
             self._replanned.append(self._nearest)
-            return OBSTRUCTED
+            return Trigger.OBSTRUCTED
         traffic = self._traffic
         if traffic is None or not traffic.grown(self._grid.cell) or not self.heavy(tick, pose):
             return ""
-        return TRAFFIC if self.zones(tick, pose, self._around(pose))[-1].crossed(tracked, arc) else ""
+        return Trigger.TRAFFIC if self.zones(tick, pose, self._around(pose))[-1].crossed(tracked, arc) else ""
 
     def _obstructed(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
         """Return whether movers will cover the route ahead."""
-        return close_route(self.discs(tick, pose), tracked, arc, self._policy.obstruction_range, self._grid.inflate)
+        return obstructs_route(self.discs(tick, pose), tracked, arc, self._policy.obstruction_range, self._grid.inflate)
 
     def heavy(self, tick: int, pose: Pose) -> bool:
         """Return whether traffic is heavy enough to plan around zones."""
@@ -286,7 +286,7 @@ class MoversAhead:
 
         Routes are driven at a speed [m/s]. A robot that has waited, or that sees only standing movers, takes any route.
         """
-        if trigger == WAITED or around <= free + self._policy.max_wait * speed:
+        if trigger == Trigger.WAITED or around <= free + self._policy.max_wait * speed:
             return False
         return bool((np.hypot(*self._predictor.velocities(tick, pose[:2]).T) >= STANDS).any())
 

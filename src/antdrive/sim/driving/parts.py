@@ -183,7 +183,9 @@ class Guide(Protocol):
         """Log a search for a new route (N, 2) [m] and the plan's cost [m]."""
         points = tuple(map(tuple, np.round(xy, 4).tolist()))
         self.log.append(
-            ReplanRecord(t=t, trigger=trigger, solved=len(xy) > 0, cost_m=finite_or_none(cost), work=work, route=points)
+            ReplanRecord(
+                t=t, trigger=str(trigger), solved=len(xy) > 0, cost_m=finite_or_none(cost), work=work, route=points
+            )
         )
         self.walls.append(wall_s)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,11 +13,9 @@ from antdrive.robots import Twist, footprint_clearance
 from antdrive.robots.clearance import kernel_shape
 from antdrive.sim.driving import _kernels_movers
 from antdrive.sim.driving.parts import Ending
-from antdrive.sim.log.contacts import Attribution
 from antdrive.sim.log.ending import rows_after_contact
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine, State
-from antdrive.worlds import Trajectories
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +71,6 @@ class Bullet:
         self._engine.command(*actuated)
         self._log(self.per_tick, (*command, limiter, *actuated))
 
-    def play(self, targets: Floats) -> Drive:
-        """Play motor targets (N, 2), one row per physics step, and return the log."""
-        for row in range(0, len(targets), self.per_tick):
-            target = targets[row].tolist()
-            self._engine.command(*target)
-            self._log(min(self.per_tick, len(targets) - row), (*target, 0, *target))
-        return self._drive(Ending(Outcome.TIMED_OUT))
-
     def _log(self, steps: int, in_force: tuple[float, ...]) -> None:
         self.state, contacts = self._engine.advance(steps, self._motion)
         if contacts:
@@ -91,13 +80,10 @@ class Bullet:
         self._lengths.append(steps)
 
     def finish(self, ending: Ending) -> Drive:
-        """Return the whole log. After a contact the robot brakes first, and the contact is attributed to it or to the mover."""
+        """Return the whole log. After a contact the robot brakes first."""
         if self.touched:
             self._engine.command(0.0, 0.0)
             self._log(rows_after_contact(self._engine.physics_hz), (0.0, 0.0, self._in_force[-1][2], 0.0, 0.0))
-        return self._drive(ending)
-
-    def _drive(self, ending: Ending) -> Drive:
         engine = self._engine
         states = np.concatenate([[self._start], engine.states(self._motion)])
         in_force = np.repeat(np.array(self._in_force, dtype=np.float64), self._lengths, axis=0)
@@ -109,8 +95,6 @@ class Bullet:
         if engine.trajectories:
             shape = kernel_shape(engine.robot.footprint)
             _kernels_movers.lower_by_movers(pose, *shape, movers, engine.trajectories.radii, clearance)
-            if ending.outcome is Outcome.COLLIDED:
-                ending = _attribute(engine, engine.trajectories, t, pose, twist, movers, contacts)
         return Drive(
             outcome=ending.outcome,
             reason=ending.reason,
@@ -154,34 +138,3 @@ class Kinematic:
         x, y, yaw = self.way[-1].tolist()
         self.state = State(x, y, yaw, *actuated)
         self.poses.append((x, y, yaw))
-
-
-def _attribute(
-    engine: Engine,
-    trajectories: Trajectories,
-    t: Floats,
-    pose: Floats,
-    twist: Floats,
-    movers: Floats,
-    contacts: Floats,
-) -> Ending:
-    """Attribute the first contact to the robot or to the mover, and name the mover and both speeds."""
-    discs = len(engine.world.obstacles)
-    attribution = Attribution(
-        pose=pose,
-        twist=twist,
-        movers=movers,
-        jumps=trajectories.jumps(t),
-        hz=engine.physics_hz,
-        discs=discs,
-        radii=trajectories.radii,
-        footprint=engine.robot.footprint,
-        deceleration=engine.robot.max_acceleration,
-    )
-    first = attribution.touches(contacts)[0]
-    m, before = first.obstacle - discs, max(first.step - 1, 0)
-    if not 0 <= m < len(trajectories):
-        return Ending(first.outcome)
-    speed = math.hypot(*trajectories.velocities(t[before])[0, m])
-    reason = f"movers[{m}] at {speed:.2f} m/s, the robot at {abs(twist[before, 0]):.2f} m/s"
-    return Ending(first.outcome, reason)

@@ -149,7 +149,7 @@ class Recovery:
         if not turns:
             return False
         lidar, seen = self._survey.lidar, self._survey.map
-        rate = lidar.field_of_view * lidar.rate / (VIEWS * seen.share * seen.turns)
+        rate = lidar.field_of_view * lidar.rate / (VIEWS * seen.share * seen.stride)
         self.scan_turn = ScanTurn(turns, pose[2], min(rate, self._robot.max_yaw_rate), self._robot, self._hz)
         return True
 

@@ -37,8 +37,7 @@ from antdrive.sim.driving.movers_ahead import MoversAhead, Traffic
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.route_planner import RoutePlanner
 from antdrive.sim.driving.routes import OneRoute
-from antdrive.sim.log.record import DECISION
-from antdrive.sim.policy import LATE, MISSED, STRAYED, WAITED, ReplanPolicy
+from antdrive.sim.policy import ReplanPolicy, Trigger
 from antdrive.worlds import Disc, Grid, Route, segment_clearance
 
 
@@ -52,12 +51,12 @@ class Replanning(OneRoute):
     """
 
     def __init__(
-        self, planner: RoutePlanner, policy: ReplanPolicy, movers: PerceivedMovers, keeps: float = 0.0
+        self, planner: RoutePlanner, policy: ReplanPolicy, movers: PerceivedMovers, clearance: float = 0.0
     ) -> None:
         super().__init__(planner)
         self.policy = policy
         self._hz = planner.hz
-        self._predictor, self._keeps = movers, keeps
+        self._predictor, self._clearance = movers, clearance
         self._task = dataclasses.replace(planner.task, world=dataclasses.replace(planner.task.world, movers=()))
         self._timed = bool(planner.motions)
         self._replanned_at = -math.inf
@@ -66,7 +65,7 @@ class Replanning(OneRoute):
         """Return the route of a plan, and its path for the controller."""
         self._grid, policy = grid, self.policy
         movers, robot, task = self._predictor, self._routes.robot, self._task
-        self.blockage = Blockage(task, grid, movers, self._hz, policy, self._keeps)
+        self.blockage = Blockage(task, grid, movers, self._hz, policy, self._clearance)
         learns = policy.around_movers and movers.uncertain and not self._timed
         traffic = Traffic(movers, robot.radius, task.world.bounds, self._hz) if learns else None
         self._ahead = MoversAhead(movers, policy, task.goal, grid, self._hz, traffic, self.blockage)
@@ -79,7 +78,7 @@ class Replanning(OneRoute):
 
     def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
         """Return a new path for a robot that stands at the end of its route, but not at the goal; None if there is none."""
-        return self.replan(tick, pose, MISSED)
+        return self.replan(tick, pose, Trigger.MISSED)
 
     def clearance_reduction(self, tick: int, position: Point) -> Floats:
         """Return how much closer than usual the robot may pass each perceived mover (P,) [m]."""
@@ -94,11 +93,11 @@ class Replanning(OneRoute):
         deviation = math.dist(points_at(tracked, np.array([arc]))[0], pose[:2])
         shortfall = math.dist(tracked.route.xy[-1], pose[:2]) - (tracked.length - arc)
         if deviation > policy.max_deviation or shortfall > policy.max_shortfall:
-            return STRAYED
+            return Trigger.STRAYED
         if self._timed:
-            return LATE if self.schedule is None or self.schedule.late(now, arc) else ""
+            return Trigger.LATE if self.schedule is None or self.schedule.late(now, arc) else ""
         due = self._ahead.trigger(tick, pose, tracked, arc) if policy.around_movers else ""
-        if due == WAITED:
+        if due == Trigger.WAITED:
             self.blockage.note_gaps(tick, pose[:2], tracked, arc)
         return due
 
@@ -110,7 +109,7 @@ class Replanning(OneRoute):
         self._ahead.reset_wait()
         spent = clock()
         # Near the goal, local avoidance is enough.
-        around_movers = self.policy.around_movers and trigger != MISSED and not self._timed
+        around_movers = self.policy.around_movers and trigger != Trigger.MISSED and not self._timed
         discs = self._ahead.discs(tick, pose) if around_movers else []
         try:
             task = dataclasses.replace(self._task, start=pose)
@@ -183,9 +182,9 @@ class CellByCell(Replanning):
         return not self._arrived
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
-        """Return `DECISION` shortly before the robot reaches its cell, and repeatedly while it waits; else empty."""
+        """Return `Trigger.DECISION` shortly before the robot reaches its cell, and repeatedly while it waits; else empty."""
         if tick == 0:
-            return DECISION
+            return Trigger.DECISION
         since = tick / self._hz - self._replanned_at
         if self._arrived or since < DECISION_PAUSE:
             return ""
@@ -193,12 +192,12 @@ class CellByCell(Replanning):
             self._note_no_path(tick, pose)
         if self.blockage.reason:
             return ""
-        return DECISION if tracked.length - arc < DECIDE_BEFORE * self._grid.cell else ""
+        return Trigger.DECISION if tracked.length - arc < DECIDE_BEFORE * self._grid.cell else ""
 
     @compiled()
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """Return the path to the next cell; None if the robot waits."""
-        if trigger == MISSED:  # before arrival the next decision is due soon
+        if trigger == Trigger.MISSED:  # before arrival the next decision is due soon
             return super().replan(tick, pose, trigger) if self._arrived else None
         now, spent = tick / self._hz, clock()
         self._replanned_at = now
@@ -233,7 +232,7 @@ class CellByCell(Replanning):
         self._noted_at = now
         self.blockage.failed(tick, pose)
         if self.blockage.reason:
-            self.note(now, DECISION)
+            self.note(now, Trigger.DECISION)
 
     def _line(self, pose: Pose, here: tuple[int, int], to: tuple[int, int] | None, tick: int) -> Floats:
         """Return the line from the robot to the next cell (2 or 3, 2) [m], through the centre of its own cell if necessary."""

@@ -87,7 +87,7 @@ class RoutePlanner:
     seed: int  # the seed of the drive's random numbers
     noise: float  # factor on the robot's documented noise
     motions: tuple[MoverMotion, ...] = ()  # motions of the movers, for space-time planners
-    mapped: bool = True  # whether all plans use the grid of the given map
+    mapless: bool = False  # whether plans use the occupancy map instead of the given one
     whole: bool = True  # whether the planner plans whole routes, rather than cell by cell
 
     def __post_init__(self) -> None:
@@ -118,19 +118,21 @@ class RoutePlanner:
         return capabilities_of(self.planner)
 
     @property
-    def turns(self) -> bool:
+    def tries_footprint(self) -> bool:
         """Whether plans may keep the footprint clear instead of the disc."""
-        return self.footprint != "disc" and not self.robot.footprint.is_disc and self.can_turn
+        return self.footprint != "disc" and not self.robot.footprint.is_disc and self.plans_footprints
 
     @property
-    def can_turn(self) -> bool:
+    def plans_footprints(self) -> bool:
         """Whether the planner plans for footprints; one that decides cell by cell knows no headings."""
         return self.can.turns and self.whole
 
     @property
     def shapes(self) -> tuple[bool, ...]:
         """The shapes to plan for in turn, until there is a path: the disc (False), the footprint (True)."""
-        return {"disc": (False,), "auto": (False, True), "exact": (True,)}[self.footprint if self.turns else "disc"]
+        return {"disc": (False,), "auto": (False, True), "exact": (True,)}[
+            self.footprint if self.tries_footprint else "disc"
+        ]
 
     def chosen_grid(self) -> Grid:
         """Return the grid of the first plan.
@@ -141,7 +143,7 @@ class RoutePlanner:
         """
         world = by_geometry(self.task.world)
         disc = grid_of(world, self.cell, self.inflate)
-        if not self.turns:
+        if not self.tries_footprint:
             return disc
         length = self._shortest(disc) if self.footprint == "auto" else math.inf
         cells = [self.outlined_cell]
@@ -187,14 +189,14 @@ class RoutePlanner:
         map and movers to avoid, planners without their own replanner plan from scratch.
         """
         can, moving = self.can, bool(discs) or zone is not None
-        if can.needs_world and (self.mapped or moving):
+        if can.needs_world and (not self.mapless or moving):
             task = with_obstacles(task, [*discs, *(zone.discs if zone is not None else ())])
             grid = rasterise(task.world, grid.cell, grid.inflate)
         query = Query.between(grid, task)
         unreachable = PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
-        if query.unreachable and not self.mapped:
+        if query.unreachable and self.mapless:
             return unreachable
-        if can.needs_world or not (self.mapped or moving or can.own_replanner):
+        if can.needs_world or (self.mapless and not (moving or can.own_replanner)):
             return self.plan(query, self.rng)
         closed = (
             np.flatnonzero(closed_cells(query, discs, zone.blocked if zone is not None else None))
@@ -203,7 +205,7 @@ class RoutePlanner:
         )
         with planner_errors(self.planner):
             # Without a map, movers change so many cells that repair is no faster than a new search.
-            answer = self._replanner(query, closed, kept=self.mapped or not moving).result()
+            answer = self._replanner(query, closed, kept=not (self.mapless and moving)).result()
             answer = require_result(self.planner, answer)
         # A replanner knows cells only; it cannot tell that the first cell is unreachable for the robot.
         return unreachable if query.unreachable else self.validated(query, answer)
@@ -230,7 +232,7 @@ class RoutePlanner:
                 del self._kept[next(iter(self._kept))]
         else:
             replanner, before = last.replanner, last.closed
-            if not self.mapped:
+            if self.mapless:
                 known = raster is not None and last.grid is grid
                 replanner.change(grid, raster.changed_since(last.updates) if raster is not None and known else None)
         for tell, some, others in ((replanner.clear, before, closed), (replanner.block, closed, before)):

@@ -115,4 +115,4 @@ def logged_positioning(record: DriveRecord) -> tuple[Senses, Exact]:
     """Create the senses and the localiser of a logged drive."""
     odometry = 1.0 if record.sensing is None else record.sensing.odometry
     levels = record.localisation, record.robot, record.noise, odometry, 1 / record.control_hz
-    return positioning(*levels, record.task.start, record.seed, mapless=record.exploring)
+    return positioning(*levels, record.task.start, record.seed, mapless=record.mapless)

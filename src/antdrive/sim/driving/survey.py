@@ -16,7 +16,7 @@ from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.mover_tracking import MAP_CELL, MoverTracking
 from antdrive.sim.driving.observation import FirstSight
 from antdrive.sim.log.record import DriveRecord
-from antdrive.sim.policy import SCANNED
+from antdrive.sim.policy import Trigger
 from antdrive.sim.sensing.mapping import OccupancyMap, clear_way, shape_of
 from antdrive.sim.sensing.matching import FAR, ScanMatcher, without_sliding
 from antdrive.sim.sensing.tracking import Ground
@@ -50,7 +50,7 @@ def reset_ticks(record: DriveRecord) -> Iterator[int]:
     """Yield the control periods in which a mapless robot reset its map, after `PATIENCE` failed plans in a row."""
     failures = 0
     for replan in record.replans:
-        if failures >= PATIENCE and replan.trigger != SCANNED:
+        if failures >= PATIENCE and replan.trigger != Trigger.SCAN_TURN:
             failures = 0
             yield round(replan.t * record.control_hz)
         failures = 0 if replan.solved else failures + 1

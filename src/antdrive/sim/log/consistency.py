@@ -20,8 +20,9 @@ from antdrive.robots.clearance import footprint_clearance
 from antdrive.robots.spec import SAMPLE_RATE, Odometry
 from antdrive.sim.log.ending import false_endings
 from antdrive.sim.log.metrics import driven_length_m, nearest_on_route, succeeded
-from antdrive.sim.log.record import DECISION, DriveRecord, free_radius
+from antdrive.sim.log.record import DriveRecord, free_radius
 from antdrive.sim.log.rollout import Rollout, estimates_of
+from antdrive.sim.policy import Trigger
 from antdrive.worlds.route import NEAR, longest_line, short_of_goal
 
 JUST_ROOM = 1e-6  # a goal with at most this much more room than the inflation may count as too narrow [m]
@@ -36,7 +37,7 @@ POINT_SPACING = 0.05  # spacing of the route points whose clearance is checked [
 
 def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
     """Yield every contradiction of the plan with the world, itself or the rows."""
-    if not rollout.record.exploring:  # else plans refer to the occupancy map, in the frame of its odometry
+    if not rollout.record.mapless:  # else plans refer to the occupancy map, in the frame of its odometry
         yield from _check_routes(rollout)
         yield from _check_cells(rollout)
         yield from _check_cost(rollout)
@@ -214,7 +215,7 @@ def _check_length(rollout: Rollout) -> Iterator[str]:
     """Check that the plan's length is that of its cells, or of a line no longer than they allow and no shorter than any path."""
     record, plan, leads = rollout.record, rollout.record.plan, sum(_leads(rollout))
     slack = SAME_LENGTH * max(1.0, plan.length_m)
-    drawn = not record.exploring and (plan.cost_m is None or abs(plan.length_m - plan.cost_m) > slack)
+    drawn = not record.mapless and (plan.cost_m is None or abs(plan.length_m - plan.cost_m) > slack)
     if plan.length_m < _straight(rollout) - leads - slack:
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but start and goal are farther apart"
     elif drawn and plan.length_m < (plan.euclidean_optimum_m or 0.0) - leads - slack:
@@ -255,7 +256,7 @@ def _check_optima(rollout: Rollout) -> Iterator[str]:
     narrow = not _has_room(rollout, free_radius(record.robot, record.margin, record.footprint_margin))
     paths = [driven_length_m(rollout) + record.task.goal_tolerance] if succeeded(rollout) else []
     cells, on_grid = plan.length_m if plan.cost_m is None else plan.cost_m, paths
-    if not record.exploring:
+    if not record.mapless:
         route = polyline_length(rollout.route) + math.dist(rollout.route[-1], record.task.goal)
         on_grid, paths = [cells], [*paths, cells + leads, route]
     doubted = []
@@ -265,7 +266,7 @@ def _check_optima(rollout: Rollout) -> Iterator[str]:
             yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
         elif value is not None and value <= min(longest, default=0.0) + slack:
             continue
-        elif value is not None and longest is on_grid and not record.exploring and plan.cost_m is not None:
+        elif value is not None and longest is on_grid and not record.mapless and plan.cost_m is not None:
             yield f"record.plan.{key}: {value:.6g} m, but the cells are {plan.cost_m:.6g} m long"
         else:
             doubted.append(key)
@@ -310,12 +311,12 @@ def _check_movers_known(rollout: Rollout) -> Iterator[str]:
         yield f"record.perception: must {'not ' if moving else ''}be null {'among' if moving else 'without'} movers"
     if len(rollout.tracks) and not watching:
         yield "tracks: must be empty, since the lidar did not track movers"
-    if len(rollout.scans) and not (watching or record.exploring):
+    if len(rollout.scans) and not (watching or record.mapless):
         yield "scans: must be empty, since the robot did not use its lidar"
     if watching and len(rollout.tracks) and not (rollout.tracks[:, 6] > 0).all():
         yield "tracks: radii must be greater than 0"
     for key in ("avoidance", "replanning"):
-        if getattr(record, key) is not None and not moving and not (key == "replanning" and record.exploring):
+        if getattr(record, key) is not None and not moving and not (key == "replanning" and record.mapless):
             yield f"record.{key}: must be null without movers"
 
 
@@ -335,10 +336,10 @@ def _check_replans(rollout: Rollout) -> Iterator[str]:
                 away = math.dist(replan.route[0], here)
                 yield f"record.replans[{i}].route: begins {away:.3g} m from the robot"
             left = math.dist(replan.route[-1], record.task.goal)
-            if replan.trigger != DECISION and not record.exploring and left > _short_of_goal(rollout):
+            if replan.trigger != Trigger.DECISION and not record.mapless and left > _short_of_goal(rollout):
                 yield f"record.replans[{i}].route: ends {left:.3g} m from the task's goal"
-        if replan.trigger == DECISION and not _decides(record):
-            yield f"record.replans[{i}].trigger: {DECISION}, but the planner plans whole routes"
+        if replan.trigger == Trigger.DECISION and not _decides(record):
+            yield f"record.replans[{i}].trigger: {Trigger.DECISION}, but the planner plans whole routes"
 
 
 def _decides(record: DriveRecord) -> bool:
@@ -474,7 +475,7 @@ def _check_commands(rollout: Rollout, end: int) -> Iterator[str]:
     steps = np.abs(np.diff(np.concatenate([np.zeros((1, 2)), command[1:end:period]]), axis=0))
     most = HARDER * np.array([robot.max_acceleration, robot.max_yaw_acceleration]) / record.control_hz
     # Avoidance, schedules and the stopping constraint slow down on the same arc: the yaw rate falls with the speed at once.
-    if record.perception is not None or record.exploring:
+    if record.perception is not None or record.mapless:
         most[1] = np.inf
     if not (steps <= most + EXACT).all():
         row = int((steps > most + EXACT).any(axis=1).argmax()) * period + 1
@@ -544,7 +545,7 @@ def _check_estimate(rollout: Rollout) -> Iterator[str]:
     record, robot = rollout.record, rollout.record.robot
     noise = robot.noise.scaled(record.noise)
     scale, shift, twist = noise.slip + noise.encoder, 0.0, 0.0
-    if record.exploring:
+    if record.mapless:
         assert record.sensing is not None
         errors, (shift, twist) = Odometry().scaled(record.sensing.odometry), MATCHED
         scale += errors.speed_scale + errors.speed_noise

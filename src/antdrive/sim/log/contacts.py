@@ -12,6 +12,7 @@ that the robot is pushed into belong to the push. The outcome of a touch is
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -42,7 +43,7 @@ def touches_of(rollout: Rollout) -> list[Touch]:
     if not len(rollout.contacts):
         return []
     record, movers = rollout.record, rollout.trajectories()
-    attribution = Attribution(
+    return Attribution(
         pose=rollout.pose,
         twist=rollout.twist,
         movers=rollout.movers,
@@ -52,8 +53,22 @@ def touches_of(rollout: Rollout) -> list[Touch]:
         radii=movers.radii,
         footprint=record.robot.footprint,
         deceleration=record.robot.max_acceleration,
+    ).touches(rollout.contacts)
+
+
+def attributed(rollout: Rollout) -> Rollout:
+    """Attribute the first contact of a log, if it has one among movers, to the robot or to the mover, with both speeds."""
+    movers = rollout.trajectories()
+    if not movers or not len(rollout.contacts):
+        return rollout
+    first = touches_of(rollout)[0]
+    m, before, reason = first.obstacle - len(rollout.record.world.obstacles), max(first.step - 1, 0), ""
+    if 0 <= m < len(movers):
+        speed = math.hypot(*movers.velocities(rollout.t[before])[0, m])
+        reason = f"movers[{m}] at {speed:.2f} m/s, the robot at {abs(rollout.twist[before, 0]):.2f} m/s"
+    return dataclasses.replace(
+        rollout, record=dataclasses.replace(rollout.record, outcome=first.outcome, reason=reason)
     )
-    return attribution.touches(rollout.contacts)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -186,7 +186,7 @@ def _ends_by_itself(rollout: Rollout) -> bool:
     record, here = rollout.record, estimates_of(rollout)[-1]
     if math.dist(here[:2], record.task.goal) <= record.task.goal_tolerance + ROUNDING:
         return True
-    return not record.exploring and _at_route_end(rollout)
+    return not record.mapless and _at_route_end(rollout)
 
 
 def _at_route_end(rollout: Rollout) -> bool:

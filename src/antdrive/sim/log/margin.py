@@ -106,7 +106,7 @@ def footprint_margins(record: DriveRecord) -> tuple[float, ...]:
         KeyError, TypeError, ValueError: the controller's settings are none that a drive has.
     """
     asked, can = (record.settings or {}).get("footprint", SETTINGS["footprint"].default), known_capabilities(record)
-    moving = record.perception is not None and not record.exploring
+    moving = record.perception is not None and not record.mapless
     by_cell = moving and (record.replanning or {}).get("around_movers") and can is not None and can.cell_by_cell
     if asked == "disc" or record.robot.footprint.is_disc or by_cell or not (can is None or can.turns):
         return ()
@@ -118,7 +118,7 @@ def footprint_margins(record: DriveRecord) -> tuple[float, ...]:
     usual = [default_margin(robot, controller, noise, kind) for kind in (record.smoothing.asked, "none")]
     of_lines = own or margin in usual or (record.margin_choice is not None and asked == "auto")
     margins = outline_margins(robot, controller, noise, margin, of_lines=of_lines)
-    return mapless_margins(margins, margin) if record.exploring else margins
+    return mapless_margins(margins, margin) if record.mapless else margins
 
 
 def budget(rollout: Rollout) -> Budget:

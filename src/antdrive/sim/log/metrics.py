@@ -102,14 +102,14 @@ def gap_to_grid_optimum(rollout: Rollout) -> float:
     """`path_length_m` / `plan.grid_optimum_m` - 1; below 0 where an any-angle line is shorter. NaN if the optimum is null or
     0, and for a mapless robot, whose first plan precedes its knowledge of the world.
     """
-    if rollout.record.exploring:
+    if rollout.record.mapless:
         return math.nan
     return _over(path_length_m(rollout), rollout.record.plan.grid_optimum_m)
 
 
 def gap_to_euclidean_optimum(rollout: Rollout) -> float:
     """`route_length_m` / `plan.euclidean_optimum_m` - 1. NaN if the optimum is null or 0, and for a mapless robot."""
-    if rollout.record.exploring:
+    if rollout.record.mapless:
         return math.nan
     return _over(route_length_m(rollout), rollout.record.plan.euclidean_optimum_m)
 
@@ -268,7 +268,7 @@ def explored_m2(rollout: Rollout) -> float:
     range, at the lidar's `max_range` for the code 0, and at 0 for the code 1. The occupancy map covers less: it uses beams only
     up to the range at which they are one cell apart. NaN for a robot with a map or without scans.
     """
-    if not (rollout.record.exploring and len(rollout.scans)):
+    if not (rollout.record.mapless and len(rollout.scans)):
         return math.nan
     from antdrive.sim.log.sights import seen_ground  # imported here, because it loads kernels
 

@@ -49,9 +49,6 @@ MAX_MARGIN = 1000.0
 
 MARGIN_ROUNDING = 1e-9  # [m]
 
-#: Trigger of replans by planners that decide cell by cell.
-DECISION = "decision"
-
 
 class Proof(Enum):
     """Check of a value in a log: the first level of `antdrive verify` that recomputes or compares it."""
@@ -401,7 +398,7 @@ class DriveRecord:
         return max(1, self.physics_hz // self.control_hz)
 
     @property
-    def exploring(self) -> bool:
+    def mapless(self) -> bool:
         """Whether the robot had no map."""
         return self.sensing is not None and self.sensing.map == "none"
 

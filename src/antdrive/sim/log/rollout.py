@@ -436,6 +436,10 @@ class Rollout:
         return f"<Rollout of {names}: {self.outcome.value}, {self.t[-1]:.1f} s in {len(self.t)} rows>"
 
     def _repr_html_(self) -> str:
+        return self.card()
+
+    def card(self, **more: object) -> str:
+        """Return the log as HTML for notebooks, with `more` facts by name."""
         from antdrive.worlds.svg import LINE, card, world_svg
 
         task, world = self.record.task, self.record.world
@@ -448,6 +452,7 @@ class Rollout:
             "robot": self.record.robot.name,
             "time": f"{self.t[-1]:.1f} s",
             "minimum clearance": f"{self.clearance.min():.3f} m",
+            **more,
         }
         return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
 

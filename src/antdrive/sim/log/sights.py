@@ -86,13 +86,9 @@ def beams_of(rollout: Rollout, k: int) -> Beams:
     return Beams(np.array(lidar.pose_on((x, y, yaw))), float(lidar.angles[0]) - lidar.yaw, reaches)
 
 
-def meet(rollout: Rollout, k: int, met: Floats) -> None:
-    """Note the cylinders hit for the first time by a scan."""
-    _meet(rollout, k, rollout.record.world.discs, met)
-
-
-def _meet(rollout: Rollout, k: int, discs: Floats, met: Floats) -> None:
-    """Note the discs (N, 3) hit for the first time by a scan."""
+def meet(rollout: Rollout, k: int, met: Floats, movers: Floats | None = None) -> None:
+    """Note the cylinders, or the discs of movers (M, 3), that a scan hits for the first time."""
+    discs = rollout.record.world.discs if movers is None else movers
     lidar, (eye, first, reaches) = lidar_of(rollout), beams_of(rollout, k)
     slack, now = 4 * lidar.sigma + lidar.resolution / 2 + ROUNDING, float(rollout.t[rollout.scan_rows[k]])
     kernels.first_meetings(eye, first, lidar.spacing, lidar.full_circle, reaches, discs, slack, now, met)
@@ -124,7 +120,7 @@ def mover_sightings(rollout: Rollout) -> list[Sighting]:
     radii = np.array([mover.radius for mover in record.world.movers])
     met = np.full(len(radii), math.inf)
     for k, row in enumerate(rows.tolist()):
-        _meet(rollout, k, np.column_stack((rollout.movers[row], radii)), met)
+        meet(rollout, k, met, np.column_stack((rollout.movers[row], radii)))
     touched = set((rollout.contacts[:, 1].astype(int) - len(record.world.obstacles)).tolist())
     movers = []
     for j, (first, followed) in enumerate(zip(met.tolist(), tracked_rows(rollout), strict=True)):

@@ -61,46 +61,56 @@ TRACK = np.dtype(
 
 
 class TrackingRules(NamedTuple):
-    """Tracking rules: the numbers of a `TrackingPolicy`, with those derived from them and from the lidar.
+    """Parameters of mover tracking: those of the lidar and the estimates, then those that are fixed.
 
     Attributes:
-        gap, least, settle, smallest, largest, gate, speed, confirmed, way, patience, doubt: as in the policy
         whole: variance of the centre of a fully visible mover, without that of the pose (,) [m^2]
         part: the same for a partly hidden one [m^2]
         pose_xy: variance of the robot's position [m^2]
         pose_yaw: standard deviation of its heading [rad]
-        power: 2.0. Python's `x ** 2` rounds differently from `x * x` in one of a thousand cases; a number unknown to the compiler
-            makes both agree
         spacing: angle between two beams [rad]
         first: angle of the first beam in the lidar's frame [rad]
         reach: the lidar's longest range [m]
         rate: scans per second [Hz]
         closed: whether the first beam is beside the last
         complete: whether the map is complete; else the robot is making it
+        power: 2.0. Python's `x ** 2` rounds differently from `x * x` in one of a thousand cases; a number unknown to the compiler
+            makes both agree
+        gap: neighbouring points farther apart belong to different objects [m]
+        least: minimum number of points that starts a track
+        settle: time after which an object on formerly free ground belongs to the occupancy map [s]
+        smallest: least estimated radius [m]
+        largest: largest estimated radius [m]
+        gate: largest distance between a cluster and a track's prediction [m]
+        speed: highest speed of a mover, which widens the gate of a new track [m/s]
+        confirmed: scans that must hit a mover before it counts
+        way: distance that a mover must cover before it counts [m]; 0 on a given map
+        patience: time for which an occluded track is kept [s]
+        doubt: the same for an unconfirmed track [s]
     """
 
-    gap: float
-    least: int
-    settle: float
-    smallest: float
-    largest: float
-    gate: float
-    speed: float
-    confirmed: int
-    way: float
-    patience: float
-    doubt: float
     whole: float
     part: float
     pose_xy: float
     pose_yaw: float
-    power: float
     spacing: float
     first: float
     reach: float
     rate: float
     closed: bool
     complete: bool
+    power: float = 2.0
+    gap: float = 0.2
+    least: int = 3
+    settle: float = 2.0
+    smallest: float = 0.05
+    largest: float = 1.0
+    gate: float = 0.4
+    speed: float = 2.0
+    confirmed: int = 3
+    way: float = 0.12
+    patience: float = 3.0
+    doubt: float = 0.5
 
 
 class View(NamedTuple):

@@ -45,7 +45,7 @@ class OccupancyMap:
     need nine such scans.
 
     Every `share`-th scan is entered as a whole. The others contribute their hits only: obstacles appear at once, and free
-    ground with the next whole scan. A whole scan enters the free paths of every `turns`-th beam, of other beams each
+    ground with the next whole scan. A whole scan enters the free paths of every `stride`-th beam, of other beams each
     time; the first scan enters those of all beams.
 
     Attributes:
@@ -54,7 +54,7 @@ class OccupancyMap:
         trust: ground is observed as free up to this distance [m]
         scans: number of scans entered
         share: every `share`-th scan is entered as a whole, beginning with the first
-        turns: whole scans enter the free paths of every `turns`-th beam
+        stride: whole scans enter the free paths of every `stride`-th beam
         beams: directions of the lidar's beams in its frame (beams, 2)
         layouts: number of layouts; cell indices change when the map grows
         arrays: arrays of the map by name
@@ -84,7 +84,7 @@ class OccupancyMap:
     ) -> None:
         self._moving = moving
         self.share = max(1, round(lidar.rate / OFTEN)) if share is None else share
-        self.turns = max(1, math.floor(lidar.rate / self.share / EACH_WAY))
+        self.stride = max(1, math.floor(lidar.rate / self.share / EACH_WAY))
         require("cell", cell, above=0)
         require("horizon", horizon, above=0)
         self.cell, self.horizon = cell, min(horizon, lidar.max_range)
@@ -140,12 +140,12 @@ class OccupancyMap:
         if self._spare < len(ranges):
             self._lengthen_lists()
         number, rest = divmod(self.scans, self.share)
-        turn = -1 if rest else number % self.turns
-        turns = self.turns if self.scans else 1
+        first = -1 if rest else number % self.stride
+        stride = self.stride if self.scans else 1
         self.scans += 1
         mask = self._none if omitted is None else np.ascontiguousarray(omitted)
         count = kernels.insert(
-            x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self._begin, turn, turns, mask,
+            x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self._begin, first, stride, mask,
             self.horizon, self.trust, self.scans, self.plain, self._changed,
         )  # fmt: skip
         if self._moving and not rest:
@@ -331,51 +331,6 @@ def _read_only(array: Mask) -> Mask:
     return view
 
 
-def clear_distance(
-    seen: OccupancyMap,
-    pose: Pose,
-    speed: float,
-    yaw_rate: float,
-    footprint: Footprint,
-    limit: float,
-    *,
-    freespace: bool = False,
-) -> float:
-    """Return how far the footprint, swept along a twist's arc, stays on observed free ground, at most `limit` [m].
-
-    Unknown ground counts by whole cells, hits by their discs. The result is a lower bound, to 1 mm. An overlap at the
-    start stops only a motion that comes nearer to it.
-
-    Args:
-        seen: the map
-        pose: the robot's estimated pose
-        speed: forward speed [m/s], not 0; negative: backwards
-        yaw_rate: counter-clockwise [rad/s]
-        footprint: the robot's footprint
-        limit: the largest distance of interest [m]
-        freespace: whether unknown ground counts as free, so that only hits limit the path
-    """
-    if speed == 0.0:
-        return 0.0 if yaw_rate else limit
-    return clear_way(seen, pose, speed, yaw_rate, shape_of(footprint), limit, freespace=freespace)
-
-
-def clear_turn(
-    seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footprint, limit: float, *, freespace: bool = False
-) -> float:
-    """Return how far the robot can turn on the spot over observed free ground, at most `limit` [rad], as `clear_distance`.
-
-    Args:
-        seen: the map
-        pose: the robot's estimated pose
-        yaw_rate: counter-clockwise [rad/s]; only its sign counts
-        footprint: the robot's footprint
-        limit: the largest angle of interest [rad]
-        freespace: whether unknown ground counts as free
-    """
-    return clear_way(seen, pose, 0.0, yaw_rate, shape_of(footprint), limit, freespace=freespace)
-
-
 def clear_way(
     seen: OccupancyMap,
     pose: Pose,
@@ -386,7 +341,20 @@ def clear_way(
     *,
     freespace: bool = False,
 ) -> float:
-    """Return `clear_distance` of a robot with a speed, `clear_turn` of one without, for a footprint's `shape_of`."""
+    """Return how far the footprint, swept along a twist's arc, stays on observed free ground [m]; without a speed [rad].
+
+    Unknown ground counts by whole cells, hits by their discs. The result is a lower bound, to 1 mm. An overlap at the
+    start stops only a motion that comes nearer to it.
+
+    Args:
+        seen: the map
+        pose: the robot's estimated pose
+        speed: forward speed [m/s]; negative: backwards; 0: a turn on the spot
+        yaw_rate: counter-clockwise [rad/s]
+        shape: the robot's footprint, from `shape_of`
+        limit: the largest distance or angle of interest [m], [rad]
+        freespace: whether unknown ground counts as free, so that only hits limit the path
+    """
     arrays = tuple(seen.arrays._replace(free=~seen.occupied)) if freespace else seen.plain
     length, width, rounding, corners = shape
     clear: float = _kernels_sight.clear_way(*pose, speed, yaw_rate, length, width, rounding, corners, limit, arrays)

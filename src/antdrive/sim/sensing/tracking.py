@@ -11,14 +11,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Pose
-from antdrive.base.errors import FieldError, require
 from antdrive.robots.control import _kernels_obstacles
 from antdrive.robots.control.pursuit import SQUARE, indexed_obstacles
 from antdrive.robots.lidar import Lidar
@@ -58,21 +56,17 @@ class KnownGround:
     Args:
         lidar: the robot's lidar; cylinders below its beams do not count
         world: the map; its movers do not count
-        reach: hits farther than this from the lidar are omitted [m]
         pose_xy: standard deviation of the estimated position [m]
         pose_yaw: standard deviation of the estimated heading [rad]
     """
 
     complete = True
 
-    def __init__(
-        self, lidar: Lidar, world: World, reach: float = math.inf, pose_xy: float = 0.0, pose_yaw: float = 0.0
-    ) -> None:
+    def __init__(self, lidar: Lidar, world: World, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
         tall = tuple(disc for disc in world.obstacles if disc.height >= lidar.height)
-        self._lidar, self._reach = lidar, min(reach, lidar.max_range)
-        self._pose_xy, self._pose_yaw = pose_xy, pose_yaw
+        self._lidar, self._pose_xy, self._pose_yaw = lidar, pose_xy, pose_yaw
         world = dataclasses.replace(world, obstacles=tall, movers=())
-        most = float(self._slack(np.array(self._reach)))
+        most = float(self._slack(np.array(lidar.max_range)))
         self._obstacles = indexed_obstacles(world, most, max(most, SQUARE))
 
     def hits(self, pose: Pose, ranges: Floats) -> Hits:
@@ -82,7 +76,7 @@ class KnownGround:
             pose: the robot's estimated pose
             ranges: the scan (beams,) [m]
         """
-        beams = np.flatnonzero(np.isfinite(ranges) & (ranges <= self._reach))
+        beams = np.flatnonzero(np.isfinite(ranges) & (ranges <= self._lidar.max_range))
         points, explained = ends(self._lidar, pose, ranges, beams), np.empty(len(beams), dtype=np.bool_)
         _kernels_obstacles.points_within(points, self._slack(ranges[beams]), self._obstacles, explained)
         return Hits(beams, points, explained)
@@ -130,7 +124,9 @@ def ends(lidar: Lidar, pose: Pose, ranges: Floats, beams: npt.NDArray[np.intp]) 
 
 SKIN = kernels.SKIN
 ROOM = 64  # initial capacity for tracks
+ERROR = 0.01  # standard deviation of a measured centre, without the lidar's own [m]
 PARTIAL = 3.0  # factor on the error of a partly hidden mover's centre
+ACCELERATION = 3.0  # standard deviation of the movers' acceleration [m/s^2]
 
 
 class TrackedMovers(NamedTuple):
@@ -151,102 +147,39 @@ class TrackedMovers(NamedTuple):
     met: npt.NDArray[np.bool_]
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrackingPolicy:
-    """Parameters of mover tracking.
-
-    Attributes:
-        gap: neighbouring points farther apart belong to different objects [m]
-        least: minimum number of points that starts a track
-        settle: time after which an object on formerly free ground belongs to the occupancy map [s]
-        smallest: least estimated radius [m]
-        largest: largest estimated radius [m]
-        gate: largest distance between a cluster and a track's prediction [m]
-        speed: highest speed of a mover, which widens the gate of a new track [m/s]
-        acceleration: standard deviation of the movers' acceleration [m/s^2]
-        error: standard deviation of a measured centre, without the lidar's own [m]
-        confirmed: scans that must hit a mover before it counts
-        way: distance that a mover must cover before it counts [m]; 0 on a given map
-        patience: time for which an occluded track is kept [s]
-        doubt: the same for an unconfirmed track [s]
-
-    Raises:
-        FieldError: a value is not positive.
-    """
-
-    gap: float = 0.2
-    least: int = 3
-    settle: float = 2.0
-    smallest: float = 0.05
-    largest: float = 1.0
-    gate: float = 0.4
-    speed: float = 2.0
-    acceleration: float = 3.0
-    error: float = 0.01
-    confirmed: int = 3
-    way: float = 0.12
-    patience: float = 3.0
-    doubt: float = 0.5
-
-    def __post_init__(self) -> None:
-        for key, value in vars(self).items():
-            require(key, value, above=0)
-        if not self.smallest <= self.largest:
-            raise FieldError("smallest", f"must be at most largest, {self.largest:g}, got {self.smallest:g}")
-
-
 class MoverTracker:
     """Mover tracker over the scans of one drive.
 
     Attributes:
-        policy: the tracking policy
+        rules: the tracking rules, on a complete map (True) and on the robot's own (False)
 
     Args:
         lidar: the scanning lidar
-        policy: the tracking policy; None: the default
         pose_xy: standard deviation of the estimated positions [m]
         pose_yaw: standard deviation of the estimated headings [rad]
     """
 
-    def __init__(
-        self, lidar: Lidar, policy: TrackingPolicy | None = None, pose_xy: float = 0.0, pose_yaw: float = 0.0
-    ) -> None:
-        self.policy = policy or TrackingPolicy()
-        self._lidar, self._pose_xy, self._pose_yaw = lidar, pose_xy, pose_yaw
-        self._rules = {complete: self._rules_where(complete) for complete in (False, True)}
-        self._tracks, self._count = np.zeros(ROOM, dtype=kernels.TRACK), 0
-        self._time = -math.inf
-        self._found = 0
-        self._usual = np.array((self.policy.smallest, 0.0))
-        self._now: TrackedMovers = _listed(self._tracks[:0], self._time)
-
-    def _rules_where(self, complete: bool) -> kernels.TrackingRules:
-        policy, lidar = self.policy, self._lidar
+    def __init__(self, lidar: Lidar, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
+        self._lidar = lidar
         measured = lidar.sigma**2 + lidar.resolution**2 / 12
-        return kernels.TrackingRules(
-            gap=float(policy.gap),
-            least=int(policy.least),
-            settle=float(policy.settle),
-            smallest=float(policy.smallest),
-            largest=float(policy.largest),
-            gate=float(policy.gate),
-            speed=float(policy.speed),
-            confirmed=int(policy.confirmed),
-            way=float(policy.way),
-            patience=float(policy.patience),
-            doubt=float(policy.doubt),
-            whole=policy.error**2 + measured,
-            part=(PARTIAL * policy.error) ** 2 + measured,
-            pose_xy=float(self._pose_xy) ** 2,
-            pose_yaw=float(self._pose_yaw),
-            power=2.0,
+        rules = kernels.TrackingRules(
+            whole=ERROR**2 + measured,
+            part=(PARTIAL * ERROR) ** 2 + measured,
+            pose_xy=float(pose_xy) ** 2,
+            pose_yaw=float(pose_yaw),
             spacing=lidar.spacing,
             first=float(lidar.angles[0]) - lidar.yaw,
             reach=float(lidar.max_range),
             rate=float(lidar.rate),
             closed=bool(lidar.full_circle),
-            complete=complete,
+            complete=True,
         )
+        self.rules = {True: rules, False: rules._replace(complete=False)}
+        self._tracks, self._count = np.zeros(ROOM, dtype=kernels.TRACK), 0
+        self._time = -math.inf
+        self._found = 0
+        self._usual = np.array((rules.smallest, 0.0))
+        self._now: TrackedMovers = _listed(self._tracks[:0], self._time)
 
     @property
     def tracks_begun(self) -> int:
@@ -270,7 +203,7 @@ class MoverTracker:
         """
         dt = time - self._time if math.isfinite(self._time) else 0.0
         self._time = time
-        power = self.policy.acceleration * self.policy.acceleration
+        power = ACCELERATION * ACCELERATION
         kernels.predict(self._tracks, self._count, dt, power, power * dt**4 / 4, power * dt**3 / 2)
         hits = ground.hits(pose, ranges)
         points, explained = np.ascontiguousarray(hits.points), np.ascontiguousarray(hits.explained)
@@ -280,7 +213,7 @@ class MoverTracker:
         eye = np.array(self._lidar.pose_on(pose))
         view = kernels.View(points, hits.beams, explained, owner, np.ascontiguousarray(ranges), eye, float(time))
         self._count, self._found = kernels.read(
-            view, self._rules[ground.complete], self._tracks, self._count, self._found, self._usual
+            view, self.rules[ground.complete], self._tracks, self._count, self._found, self._usual
         )
         tracks = self._tracks[: self._count]
         self._now = _listed(tracks[tracks["sure"] & (tracks["moves"] | ground.complete)], self._time)
@@ -302,14 +235,14 @@ class MoverTracker:
         points, explained = np.ascontiguousarray(hits.points), np.ascontiguousarray(hits.explained)
         mine = np.empty(len(points), dtype=np.bool_)
         dt = time - self._time if self._count else 0.0
-        kernels.suspects(self._tracks, self._count, dt, float(time), self.policy.settle, points, explained, mine)
+        kernels.suspects(self._tracks, self._count, dt, float(time), self.rules[True].settle, points, explained, mine)
         out = np.zeros(len(ranges), dtype=np.bool_)
         out[hits.beams[mine]] = True
         return out
 
     def _make_room(self, points: int) -> None:
         """Grow the track array to hold all tracks that a scan may start."""
-        needed = self._count + points // self.policy.least + 1
+        needed = self._count + points // self.rules[True].least + 1
         if needed > len(self._tracks):
             longer = np.zeros(2 * needed, dtype=kernels.TRACK)
             longer[: self._count] = self._tracks[: self._count]

@@ -77,9 +77,10 @@ def samples(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[Topi
     still = np.zeros((*rollout.movers.shape[:2], 1))
     movers = world_to_map(frame, np.concatenate([rollout.movers, still], axis=2))
     robot = np.stack([measured.pose, relative_frame(measured.pose, believed), truth], axis=1)
+    moving = np.concatenate([robot, movers], axis=1)
     none = np.zeros((len(stamps), 3, 3))
     topics = [
-        transforms("/tf", stamps, frames, np.concatenate([robot, movers], axis=1)),
+        transforms("/tf", stamps, frames, _pose7(moving.reshape(-1, 3)).reshape(*moving.shape[:2], 7)),
         odometry(
             "/odom",
             (ODOM, body.base),
@@ -118,7 +119,7 @@ def scan_topics(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[
     angles = (lidar.angles - heading) if upright else (heading - lidar.angles)[::-1]
     middle = float(angles[0] + angles[-1]) / 2
     first = float(angles[0]) - 2 * math.pi * round(middle / (2 * math.pi))
-    values = {
+    numbers = {
         "angle_min": first,
         "angle_max": first + lidar.spacing * (lidar.beams - 1),
         "angle_increment": lidar.spacing,
@@ -127,8 +128,16 @@ def scan_topics(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[
         "range_min": lidar.min_range,
         "range_max": lidar.max_range,
     }
-    ranges = scans.ranges if upright else scans.ranges[:, ::-1]
-    return [laser_scans("/scan", body.scan, nanoseconds(rollout.t[scans.rows]), ranges, values)]
+    layout, stamps = CdrLayout(), nanoseconds(rollout.t[scans.rows])
+    _header(layout, body.scan)
+    for name in numbers:
+        layout.number(name, "f4")
+    layout.length(lidar.beams)
+    layout.number("ranges", "f4", lidar.beams)
+    layout.length(0)
+    values: dict[str, Any] = {name: np.full(len(stamps), number) for name, number in numbers.items()}
+    values["ranges"] = scans.ranges if upright else scans.ranges[:, ::-1]
+    return [Topic("/scan", "sensor_msgs/msg/LaserScan", stamps, layout.messages(_stamp_values(stamps) | values))]
 
 
 def joint_states(topic: str, stamps: Ints, rollout: Rollout, measured: LoggedOdometry, body: RobotFrames) -> Topic:
@@ -149,7 +158,7 @@ def joint_states(topic: str, stamps: Ints, rollout: Rollout, measured: LoggedOdo
 
 
 def transforms(topic: str, stamps: Ints, frames: Sequence[tuple[str, str]], poses: Floats) -> Topic:
-    """Return messages of transforms between frames."""
+    """Return messages of transforms (N, F, 7) between frames: positions [m] and quaternions."""
     layout = CdrLayout()
     layout.length(len(frames))
     values: dict[str, Any] = {}
@@ -157,7 +166,7 @@ def transforms(topic: str, stamps: Ints, frames: Sequence[tuple[str, str]], pose
         _header(layout, parent, str(i))
         layout.text(child)
         layout.number(f"pose{i}", "f8", 7)
-        values |= _stamp_values(stamps, str(i)) | {f"pose{i}": _pose7(poses[:, i])}
+        values |= _stamp_values(stamps, str(i)) | {f"pose{i}": poses[:, i]}
     return Topic(topic, "tf2_msgs/msg/TFMessage", stamps, layout.messages(values))
 
 
@@ -196,23 +205,6 @@ def numbers(topic: str, kind: str, number: str, stamps: Ints, values: Any) -> To
     layout = CdrLayout()
     layout.number("data", number)
     return Topic(topic, kind, stamps, layout.messages({"data": values}))
-
-
-def laser_scans(
-    topic: str, frame: str, stamps: Ints, ranges: npt.NDArray[np.floating], values: dict[str, float]
-) -> Topic:
-    """Return scans of a planar lidar."""
-    layout = CdrLayout()
-    _header(layout, frame)
-    for name in values:
-        layout.number(name, "f4")
-    beams = ranges.shape[1]
-    layout.length(beams)
-    layout.number("ranges", "f4", beams)
-    layout.length(0)
-    columns: dict[str, Any] = {name: np.full(len(stamps), value) for name, value in values.items()}
-    payloads = layout.messages(_stamp_values(stamps) | columns | {"ranges": ranges})
-    return Topic(topic, "sensor_msgs/msg/LaserScan", stamps, payloads)
 
 
 def _header(layout: CdrLayout, frame: str, mark: str = "") -> None:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.plane import world_to_map
-from antdrive.base.types import Floats, Pose
+from antdrive.base.types import Floats
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.export.robot_frames import RobotFrames, quaternion
+from antdrive.views.export.samples import transforms
 from antdrive.views.export.topics import MAP, Topic, message_types, mover_frame, nanoseconds
 from antdrive.views.scene import Scene, contact_point
 from antdrive.worlds.world import World
@@ -20,13 +21,18 @@ from antdrive.worlds.world import World
 SPHERE, CYLINDER, LINE_STRIP = 2, 3, 4  # marker types
 KNOWN, UNSEEN, MOVING = (0.45, 0.47, 0.52, 1.0), (0.85, 0.2, 0.2, 1.0), (0.95, 0.6, 0.1, 1.0)
 TOUCHED, GOAL, WALL = (0.9, 0.0, 0.5, 1.0), (0.2, 0.7, 0.3, 0.4), (0.3, 0.32, 0.36, 1.0)
+FREE, OCCUPIED, UNKNOWN = 0, 100, -1  # values of nav_msgs/OccupancyGrid
+WALL_CELL, MOST_CELLS = 0.05, 2000  # side of a cell of /map [m], at most as many along a side
+PERIOD = 1.0  # between two maps of a mapless robot [s]
 FLAT, LINE, SPOT = 0.01, 0.05, 0.1  # height of the goal, width of a line, size of a contact [m]
 
 
 def scenery(rollout: Rollout, body: RobotFrames) -> tuple[Topic, list[Topic]]:
     """Return the static transforms, sent at the first row, and the other topics with few messages."""
     start = float(rollout.t[0])
-    static = _message("/tf_static", "tf2_msgs/msg/TFMessage", [start], [_static(body, start)], latched=True)
+    fixed = np.array([[[*place[:3, 3], *quaternion(place)] for _, _, place in body.links]])
+    pairs = [(parent, child) for parent, child, _ in body.links]
+    static = replace(transforms("/tf_static", nanoseconds(start), pairs, fixed), latched=True)
     latched: dict[str, tuple[str, Any]] = {
         "/robot_description": ("std_msgs/msg/String", _text(body.text)),
         "/obstacles": ("visualization_msgs/msg/MarkerArray", _markers(_standing(rollout))),
@@ -44,53 +50,56 @@ def _message(name: str, kind: str, times: Sequence[float], contents: Iterable[An
     return Topic(name, kind, nanoseconds(times), payloads, latched)
 
 
-def _static(body: RobotFrames, start: float) -> Any:
-    """Return the static transforms."""
-    return _of(
-        "tf2_msgs/msg/TFMessage",
-        transforms=[
-            _of(
-                "geometry_msgs/msg/TransformStamped",
-                header=_header(parent, start),
-                child_frame_id=child,
-                transform=_of(
-                    "geometry_msgs/msg/Transform",
-                    translation=_of(
-                        "geometry_msgs/msg/Vector3", **dict(zip("xyz", place[:3, 3].tolist(), strict=True))
-                    ),
-                    rotation=_of("geometry_msgs/msg/Quaternion", **dict(zip("xyzw", quaternion(place), strict=True))),
-                ),
-            )
-            for parent, child, place in body.links
-        ],
-    )
-
-
 def _maps(rollout: Rollout) -> list[Topic]:
     """Return the true obstacles and the planner's grid, once, or a mapless robot's growing occupancy map."""
-    if not rollout.record.exploring:
-        topics = {"/map": [wall_map(rollout)], "/global_costmap/costmap": [planning_grid(rollout)]}
+    record = rollout.record
+    if record.mapless:
+        grids = {"/map": list(_occupancy_maps(rollout))} if len(rollout.scans) else {}
     else:
-        topics = {"/map": list(occupancy_maps(rollout))} if len(rollout.scans) else {}
+        fine = max(WALL_CELL, max(record.world.size) / MOST_CELLS)  # with a ring of cells for the outer walls
+        grids = {
+            "/map": [_ground(rollout, record.world, fine, 0.0, ring=1)],
+            "/global_costmap/costmap": [_ground(rollout, record.task.world, record.cell, record.inflate)],
+        }
+    kind = "nav_msgs/msg/OccupancyGrid"
     return [
-        _message(
-            name, "nav_msgs/msg/OccupancyGrid", [g.at for g in grids], [_grid(g, MAP) for g in grids], latched=True
-        )
-        for name, grids in topics.items()
+        _message(name, kind, [at for at, _ in found], [grid for _, grid in found], latched=True)
+        for name, found in grids.items()
     ]
 
 
-def _grid(ground: GroundGrid, frame: str) -> Any:
-    rows, columns = ground.cells.shape
-    info = _of(
-        "nav_msgs/msg/MapMetaData",
-        map_load_time=_time(ground.at),
-        resolution=ground.cell,
-        width=columns,
-        height=rows,
-        origin=_pose(ground.origin),
-    )
-    return _of("nav_msgs/msg/OccupancyGrid", header=_header(frame, ground.at), info=info, data=ground.cells.reshape(-1))
+def _grid(rollout: Rollout, at: float, cell: float, corner: Sequence[float], cells: npt.NDArray[np.int8]) -> Any:
+    """Return a grid (rows, cols) in the map's frame, at a time, by the corner of its cell (0, 0) in the world."""
+    place = world_to_map(rollout.record.task.frame, [(*corner, 0.0)])[0].tolist()
+    (rows, columns), header = cells.shape, _header(MAP, at)
+    values = {"resolution": cell, "width": columns, "height": rows, "origin": _pose(place)}
+    info = _of("nav_msgs/msg/MapMetaData", map_load_time=header.stamp, **values)
+    return _of("nav_msgs/msg/OccupancyGrid", header=header, info=info, data=cells.reshape(-1))
+
+
+def _ground(rollout: Rollout, world: World, cell: float, inflate: float, ring: int = 0) -> tuple[float, Any]:
+    """Return the start and a world's grid, free where the robot's centre may be, with a ring of occupied cells around it."""
+    from antdrive.worlds.grid import rasterise
+
+    free, at = np.pad(rasterise(world, cell, inflate).free, ring), float(rollout.t[0])
+    corner = (world.bounds[0] - ring * cell, world.bounds[1] - ring * cell)
+    return at, _grid(rollout, at, cell, corner, np.where(free, FREE, OCCUPIED).astype(np.int8))
+
+
+def _occupancy_maps(rollout: Rollout) -> Iterator[tuple[float, Any]]:
+    """Yield times and a mapless robot's occupancy maps: at the start, every `PERIOD` and at the end."""
+    from antdrive.views.map_reconstruction import MapReconstruction
+
+    seen = MapReconstruction(rollout, resets=True, detections=False)
+    end = float(rollout.t[-1])
+    for at in (*np.arange(float(rollout.t[0]), end, PERIOD).tolist(), end):
+        seen.advance(at)
+        occupied, free = seen.map.occupied, seen.map.seen_free
+        rows, cols = (np.flatnonzero((occupied | free).any(axis=axis)) for axis in (1, 0))
+        part = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+        cells = np.where(occupied[part], OCCUPIED, np.where(free[part], FREE, UNKNOWN)).astype(np.int8)
+        x, y, cell = *seen.map.origin, seen.map.cell
+        yield at, _grid(rollout, at, cell, (x + cols[0] * cell, y + rows[0] * cell), cells)
 
 
 def _routes(rollout: Rollout) -> Topic:
@@ -120,12 +129,11 @@ def _standing(rollout: Rollout) -> list[Any]:
     """Return markers of cylinders, walls and goal."""
     scene, frame, at = Scene.of(rollout), rollout.record.task.frame, float(rollout.t[0])
     centres = world_to_map(frame, scene.obstacles[:, :2]).tolist()
-    markers = [
-        _marker(at, MAP, "unseen" if unseen else "cylinders", i, CYLINDER, UNSEEN if unseen else KNOWN, (x, y), size)
-        for i, ((x, y), size, unseen) in enumerate(
-            zip(centres, _sizes(scene.obstacles[:, 2:]), scene.unseen.tolist(), strict=True)
-        )
-    ]
+    markers = []
+    for i, (centre, unseen) in enumerate(zip(centres, scene.unseen.tolist(), strict=True)):
+        radius, height = scene.obstacles[i, 2:].tolist()
+        group, colour = ("unseen", UNSEEN) if unseen else ("cylinders", KNOWN)
+        markers.append(_marker(at, MAP, group, i, CYLINDER, colour, centre, (2 * radius, 2 * radius, height)))
     goal = world_to_map(frame, [scene.goal])[0].tolist()
     width = 2 * scene.goal_tolerance
     markers.append(_marker(at, MAP, "goal", 0, CYLINDER, GOAL, goal, (width, width, FLAT)))
@@ -216,10 +224,6 @@ def _markers(markers: list[Any]) -> Any:
     return _of("visualization_msgs/msg/MarkerArray", markers=markers)
 
 
-def _sizes(radii_and_heights: Floats) -> list[tuple[float, float, float]]:
-    return [(2 * radius, 2 * radius, height) for radius, height in radii_and_heights.tolist()]
-
-
 def _of(kind: str, **values: Any) -> Any:
     return message_types().types[kind](**values)
 
@@ -247,59 +251,3 @@ def _pose(pose: Sequence[float]) -> Any:
 
 def _turn(yaw: float) -> Any:
     return _of("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=float(np.sin(yaw / 2)), w=float(np.cos(yaw / 2)))
-
-
-FREE, OCCUPIED, UNKNOWN = 0, 100, -1  # values of nav_msgs/OccupancyGrid
-WALL_CELL, MOST_CELLS = 0.05, 2000  # side of a cell of /map [m], at most as many along a side
-PERIOD = 1.0  # between two maps of a mapless robot [s]
-
-
-@dataclass(frozen=True, eq=False)
-class GroundGrid:
-    """Occupancy grid at a time."""
-
-    at: float  # time [s]
-    cell: float  # side of a cell [m]
-    origin: Pose  # pose of the lower left corner of cell (0, 0) in the grid's frame: x, y [m], yaw [rad]
-    cells: npt.NDArray[np.int8]  # FREE, OCCUPIED or UNKNOWN (rows, cols)
-
-
-def planning_grid(rollout: Rollout) -> GroundGrid:
-    """Return the planner's grid in the map's frame: free where the robot's centre may be."""
-    record = rollout.record
-    return _ground(rollout, record.task.world, record.cell, record.inflate)
-
-
-def wall_map(rollout: Rollout) -> GroundGrid:
-    """Return the true obstacles in the map's frame, not inflated, with a ring of cells for the outer walls."""
-    world = rollout.record.world
-    return _ground(rollout, world, max(WALL_CELL, max(world.size) / MOST_CELLS), 0.0, ring=1)
-
-
-def _ground(rollout: Rollout, world: World, cell: float, inflate: float, ring: int = 0) -> GroundGrid:
-    """Return a world's grid in the map's frame, with a ring of occupied cells around it."""
-    from antdrive.worlds.grid import rasterise
-
-    free = np.pad(rasterise(world, cell, inflate).free, ring)
-    corner = (world.bounds[0] - ring * cell, world.bounds[1] - ring * cell, 0.0)
-    x, y, yaw = world_to_map(rollout.record.task.frame, [corner])[0].tolist()
-    return GroundGrid(float(rollout.t[0]), cell, (x, y, yaw), np.where(free, FREE, OCCUPIED).astype(np.int8))
-
-
-def occupancy_maps(rollout: Rollout) -> Iterator[GroundGrid]:
-    """Yield a mapless robot's occupancy map at the start, every `PERIOD` and at the end, in the map's frame."""
-    from antdrive.views.map_reconstruction import MapReconstruction
-
-    seen = MapReconstruction(rollout, resets=True, detections=False)
-    end = float(rollout.t[-1])
-    times = [*np.arange(float(rollout.t[0]), end, PERIOD).tolist(), end]
-    for at in times:
-        seen.advance(at)
-        occupied, free = seen.map.occupied, seen.map.seen_free
-        rows, cols = (np.flatnonzero((occupied | free).any(axis=axis)) for axis in (1, 0))
-        part = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
-        cells = np.where(occupied[part], OCCUPIED, np.where(free[part], FREE, UNKNOWN)).astype(np.int8)
-        x, y, cell = *seen.map.origin, seen.map.cell
-        corner = (x + cols[0] * cell, y + rows[0] * cell, 0.0)
-        place = world_to_map(rollout.record.task.frame, [corner])[0].tolist()
-        yield GroundGrid(at, cell, (place[0], place[1], place[2]), cells)

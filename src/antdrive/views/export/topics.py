@@ -46,15 +46,6 @@ def nanoseconds(t: npt.ArrayLike) -> Ints:
     return np.rint(np.atleast_1d(np.asarray(t, dtype=np.float64)) * 1e9).astype(np.int64)
 
 
-def in_order(topics: Sequence[Topic]) -> list[tuple[int, int]]:
-    """Return all messages as (topic, message), sorted by time, then by topic."""
-    stamps = np.concatenate([topic.stamps for topic in topics])
-    of = np.concatenate([np.full(len(topic.stamps), i) for i, topic in enumerate(topics)])
-    number = np.concatenate([np.arange(len(topic.stamps)) for topic in topics])
-    order = np.lexsort((number, of, stamps))
-    return list(zip(of[order].tolist(), number[order].tolist(), strict=True))
-
-
 def library(name: str) -> Any:
     """Import a module of rosbags or mcap."""
     return optional(name, "ros", "bags need it, tables (--to csv) do not")
@@ -88,8 +79,8 @@ def write_mcap(
             qos = yaml.dump([_qos(topic.latched)], Dumper=_WithoutAliases, sort_keys=False).strip()
             about = {"offered_qos_profiles": qos, "topic_type_hash": types.hash_rihs01(topic.kind)}
             channels.append(writer.register_channel(topic.name, "cdr", schemas[topic.kind], about))
-        for of, number in in_order(topics):
-            at = int(topics[of].stamps[number])
+        rows = ((at, i, k) for i, topic in enumerate(topics) for k, at in enumerate(topic.stamps.tolist()))
+        for at, of, number in sorted(rows):
             writer.add_message(channels[of], at, topics[of].payloads[number], at, number)
         for name, (media_type, content) in attachments.items():
             writer.add_attachment(0, 0, name, media_type, content)

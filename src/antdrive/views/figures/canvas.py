@@ -185,11 +185,4 @@ def panels(figure: Figure) -> dict[str, Axes]:
     Args:
         figure: result of a figure function
     """
-    return {str(axes.get_label()): axes for axes in figure.axes if axes.get_label() in PANELS}
-
-
-#: Names of axes.
-PANELS = (
-    *("map", "clearance", "speed", "limiters", "distance", "checks"),
-    *("explored area", "first detections", "history", "field", "lengths", "with elitism", "without elitism"),
-)
+    return {label: axes for axes in figure.axes if (label := str(axes.get_label())) not in ("", "<colorbar>")}

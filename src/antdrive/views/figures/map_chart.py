@@ -14,7 +14,7 @@ from matplotlib.path import Path
 from antdrive.base.types import Floats, Point
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views import colours
-from antdrive.views.colours import hexed
+from antdrive.views.colours import Colour, hexed
 from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, legend_above, thinned
 from antdrive.views.scene import Scene, contact_point
 from antdrive.worlds.coverage import share_of
@@ -50,8 +50,9 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
             _corners(*corners)
             for corners in ((x0, y0, x0 + i, y1), (x1 - i, y0, x1, y1), (x0, y0, x1, y0 + i), (x0, y1 - i, x1, y1))
         ]
-        pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in colours.ZONE)
-        layer = PathCollection([*zones, *zones_walls], facecolor=pale, edgecolor="none", zorder=1.2)
+        layer = PathCollection(
+            [*zones, *zones_walls], facecolor=_pale(colours.ZONE, 0.22), edgecolor="none", zorder=1.2
+        )
         if not floor:
             layer.set(facecolor="none", edgecolor=hexed(colours.ZONE), linewidth=0.6, alpha=0.8)
         axes.add_collection(layer)
@@ -120,6 +121,11 @@ def draw_coverage(axes: Any, covered: Sequence[Coverage], scale: float) -> list[
     return [*handles, *markers]
 
 
+def _pale(colour: Colour, strength: float) -> tuple[float, ...]:
+    """Return a colour mixed with white, 0 to 1."""
+    return tuple(1 - strength * (1 - channel / 255) for channel in colour)
+
+
 def _circles(centres: Floats, radii: Floats) -> list[Path]:
     """Return circles as paths, ten times as fast as matplotlib's own circles."""
     unit = Path.unit_circle()
@@ -159,7 +165,7 @@ def _draw_swept(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
     whole = np.floor(np.concatenate([[0.0], np.cumsum(moved)]) / SWEPT)
     rows = np.unique(whole, return_index=True)[1]
     bodies = [Path(outline @ _rotation(yaw).T + [x, y], closed=False) for x, y, yaw in pose[rows].tolist()]
-    pale = tuple(1 - 0.25 * (1 - channel / 255) for channel in colours.SHELL)
+    pale = _pale(colours.SHELL, 0.25)
     axes.add_collection(PathCollection(bodies, facecolor=pale, edgecolor="none", zorder=1.4))
     return [Patch(fc=pale, label="area swept")]
 
@@ -214,8 +220,7 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene, **place: Any) -> No
     if scene.mover_radii:
         known.append(Patch(fc=hexed(colours.MOVER), label=scene.movers_label))
     if scene.has_no_go_area:
-        pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in colours.ZONE)
-        known.append(Patch(fc=pale, ec=hexed(colours.ZONE), lw=0.5, label=scene.no_go_label))
+        known.append(Patch(fc=_pale(colours.ZONE, 0.22), ec=hexed(colours.ZONE), lw=0.5, label=scene.no_go_label))
     legend_above(axes, [*handles, *known], handlelength=1.6, **place)
 
 

@@ -149,7 +149,7 @@ def draw_run(run: Run, path: str | Path) -> None:
     if run.rollout is not None:
         overview(run.rollout, path)
     else:
-        plan_figure(s.task, run.grid, run.plan, s.robot, path, mapped=s.map == "given")
+        plan_figure(s.task, run.grid, run.plan, s.robot, path, mapped=not s.mapless)
 
 
 def certificate_figure(

@@ -180,25 +180,6 @@ def capsule_cover(inv: Array, row: int, col: int, ax: float, ay: float, bx: floa
 
 
 @kernel
-def cover_rings(cover: Array, fwd: Array, inv: Array, rows: Array) -> None:
-    """Raise `cover` (H, W) to 1 on rings (N, 4): centre x, y, radius, half width [m]."""
-    height, width = cover.shape
-    for i in range(rows.shape[0]):
-        cx, cy, radius, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3]
-        reach = radius + half
-        left, top, right, bottom = pixel_box(fwd, inv, cx - reach, cy - reach, cx + reach, cy + reach, width, height)
-        for row in range(top, bottom):
-            for col in range(left, right):
-                x, y, w = ground_at(inv, col + 0.5, row + 0.5)
-                ex, ey = x - cx, y - cy
-                distance = math.sqrt(ex * ex + ey * ey) + 1e-12
-                span = _span(inv, x, y, w, ex / distance, ey / distance)
-                value = min(1.0, max(0.0, 0.5 + (half - abs(distance - radius)) / span)) * min(1.0, 2.0 * half / span)
-                if value > cover[row, col]:
-                    cover[row, col] = value
-
-
-@kernel
 def blend_cover(rgb: Array, cover: Array, ground: Array, colour: Array, strength: float) -> None:
     """Blend a colour into `rgb` (H, W, 3) by coverage where `ground` is true; clear the coverage."""
     for row in range(rgb.shape[0]):
@@ -209,55 +190,6 @@ def blend_cover(rgb: Array, cover: Array, ground: Array, colour: Array, strength
                 if ground[row, col]:
                     for k in range(3):
                         rgb[row, col, k] += (colour[k] - rgb[row, col, k]) * value * strength
-
-
-@kernel
-def multiply(rgb: Array, shade: Array) -> None:
-    """Darken `rgb` (H, W, 3) by `shade` (H, W), blue less than red: outdoor shadows are slightly blue."""
-    for row in range(rgb.shape[0]):
-        for col in range(rgb.shape[1]):
-            lit = shade[row, col]
-            if lit < 1.0:
-                rgb[row, col, 0] *= lit
-                rgb[row, col, 1] *= 1.0 - 0.94 * (1.0 - lit)
-                rgb[row, col, 2] *= 1.0 - 0.80 * (1.0 - lit)
-
-
-@kernel
-def count_ground(seg: Array, factor: int, visible: Array, ground: Array) -> None:
-    """Set `visible` to the fraction of each pixel (`factor` x `factor` of `seg`) without a body, `ground` to > 0."""
-    for row in range(visible.shape[0]):
-        for col in range(visible.shape[1]):
-            seen = 0
-            for i in range(factor):
-                for j in range(factor):
-                    if seg[row * factor + i, col * factor + j] < 0:
-                        seen += 1
-            visible[row, col] = seen / (factor * factor)
-            ground[row, col] = seen > 0
-
-
-@kernel
-def resolve(rgb: Array, image: Array, seg: Array, factor: int, visible: Array, out: Array) -> None:
-    """Combine the painted ground (H, W, 3) and the bodies, rendered `factor` times as fine, into `out`."""
-    count = factor * factor
-    for row in range(out.shape[0]):
-        for col in range(out.shape[1]):
-            share = visible[row, col]
-            red, green, blue = 0.0, 0.0, 0.0
-            if share > 0.0:
-                red, green, blue = rgb[row, col, 0] * share, rgb[row, col, 1] * share, rgb[row, col, 2] * share
-            if share < 1.0:
-                for i in range(factor):
-                    for j in range(factor):
-                        r, c = row * factor + i, col * factor + j
-                        if seg[r, c] >= 0:
-                            red += image[r, c, 0] / count
-                            green += image[r, c, 1] / count
-                            blue += image[r, c, 2] / count
-            out[row, col, 0] = np.uint8(min(255.0, max(0.0, red + 0.5)))
-            out[row, col, 1] = np.uint8(min(255.0, max(0.0, green + 0.5)))
-            out[row, col, 2] = np.uint8(min(255.0, max(0.0, blue + 0.5)))
 
 
 @kernel
@@ -390,32 +322,6 @@ def put_bodies(
                 frame[y, x, 0] = np.uint8((frame[y, x, 0] * rest + red) / count + 0.5)
                 frame[y, x, 1] = np.uint8((frame[y, x, 1] * rest + green) / count + 0.5)
                 frame[y, x, 2] = np.uint8((frame[y, x, 2] * rest + blue) / count + 0.5)
-
-
-@kernel
-def put_sprite(frame: Array, sprite: Array, x0: int, y0: int, strength: float) -> None:
-    """Blend an RGBA picture (h, w, 4) into `frame` (H, W, 3) at x0, y0; parts outside are cut off."""
-    for row in range(max(0, -y0), min(sprite.shape[0], frame.shape[0] - y0)):
-        for col in range(max(0, -x0), min(sprite.shape[1], frame.shape[1] - x0)):
-            alpha = sprite[row, col, 3] * strength / 255.0
-            if alpha > 0.0:
-                for k in range(3):
-                    under = float(frame[y0 + row, x0 + col, k])
-                    frame[y0 + row, x0 + col, k] = np.uint8(under + (sprite[row, col, k] - under) * alpha + 0.5)
-
-
-@kernel
-def flash(frame: Array, colour: Array, border: float, edge: float, tint: float) -> None:
-    """Blend a colour into the border of a picture with strength `edge`, and into the rest with `tint`."""
-    height, width = frame.shape[0], frame.shape[1]
-    for row in range(height):
-        for col in range(width):
-            away = min(min(row, height - 1 - row), min(col, width - 1 - col))
-            share = edge if away < border else tint
-            if share > 0.0:
-                for k in range(3):
-                    under = float(frame[row, col, k])
-                    frame[row, col, k] = np.uint8(under + (colour[k] - under) * share + 0.5)
 
 
 @kernel

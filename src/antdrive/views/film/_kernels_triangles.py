@@ -32,12 +32,13 @@ def draw_mesh(
     normals: Array,
     triangles: Array,
     colour: Array,
+    body: int,
 ) -> None:
-    """Draw the outside of a mesh into `image` (h, w, 3) and `depth` (h, w) where it is nearest, and set `seg` to 0 there.
+    """Draw the outside of a mesh into `image` (h, w, 3) and `depth` (h, w) where it is nearest, and set `seg` to `body` there.
 
-    `place` (3, 4) turns and moves the mesh. `lens` (3, 4) maps the world to samples: column and row, both times the
-    distance ahead, and the distance ahead. `scale` holds the offset and the factor from 1 / distance to depth, then the
-    ambient and the diffuse light.
+    `place` (3, 4) turns the mesh, or stretches it along its axes, and moves it. `lens` (3, 4) maps the world to samples: column
+    and row, both times the distance ahead, and the distance ahead. `scale` holds the offset and the factor from 1 / distance to
+    depth, then the ambient and the diffuse light.
     """
     corners = np.empty((vertices.shape[0], 6))  # projected by `lens`, then the normal
     spots = np.empty((vertices.shape[0], 2))  # column and row of the corners ahead of the camera
@@ -58,7 +59,7 @@ def draw_mesh(
         if max(max(spots[i, 0], spots[j, 0]), spots[m, 0]) < math.inf:  # nothing to cut off
             down = (spots[j, 0] - spots[i, 0]) * (spots[m, 1] - spots[i, 1])
             if down < (spots[m, 0] - spots[i, 0]) * (spots[j, 1] - spots[i, 1]):  # the outside faces the camera
-                _fill(image, depth, seg, scale, light, corners[i], corners[j], corners[m], colour)
+                _fill(image, depth, seg, scale, light, corners[i], corners[j], corners[m], colour, body)
             continue
         count = 0
         for n in range(3):
@@ -72,12 +73,21 @@ def draw_mesh(
                     cut[count, k] = here[k] + share * (there[k] - here[k])
                 count += 1
         for n in range(2, count):
-            _fill(image, depth, seg, scale, light, cut[0], cut[n - 1], cut[n], colour)
+            _fill(image, depth, seg, scale, light, cut[0], cut[n - 1], cut[n], colour, body)
 
 
 @kernel
 def _fill(
-    image: Array, depth: Array, seg: Array, scale: Array, light: Array, a: Array, b: Array, c: Array, colour: Array
+    image: Array,
+    depth: Array,
+    seg: Array,
+    scale: Array,
+    light: Array,
+    a: Array,
+    b: Array,
+    c: Array,
+    colour: Array,
+    body: int,
 ) -> None:
     """Draw one triangle unless its inside faces the camera."""
     ax, ay, aw = a[0] / a[2], a[1] / a[2], 1.0 / a[2]
@@ -121,6 +131,6 @@ def _fill(
             towards = (nx * light[0] + ny * light[1] + nz * light[2]) / math.sqrt(nx * nx + ny * ny + nz * nz)
             lit = scale[2] + scale[3] * max(0.0, towards)
             depth[row, col] = z
-            seg[row, col] = 0
+            seg[row, col] = body
             for k in range(3):
                 image[row, col, k] = np.uint8(min(255.0, colour[k] * lit))

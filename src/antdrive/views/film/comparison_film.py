@@ -19,7 +19,7 @@ from antdrive.runs.comparing import SameDrive, distinct, path_text
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.colours import BAND, CALM, INK, MUTED, OUTCOME_LABELS, Colour, label_styles
 from antdrive.views.film import overlay
-from antdrive.views.film.camera import Picture, camera_for, turns
+from antdrive.views.film.camera import Picture, camera_for
 from antdrive.views.film.compositor import drawn_height
 from antdrive.views.film.film_options import ENCODERS, FilmInfo, FilmOptions
 from antdrive.views.film.prelude import has_field, planning_stages, still_camera
@@ -31,7 +31,7 @@ from antdrive.views.scene import Scene
 MAX_RUNS = 6
 FULL = (1280, 720)  # default size [px]
 LEAST_TILE = 360  # minimum width of a tile, so that its header's text fits [px]
-FILLED = 0.92  # fraction of a picture's sides that the world fills, in top view
+FILLED = 0.92  # fraction of a picture's height that the world fills, in oblique view
 
 
 def compare_film(
@@ -201,24 +201,22 @@ def fitting_size(rollouts: Sequence[Rollout], camera: str) -> tuple[int, int]:
     """Return the film size that shows the worlds at the scale of `FULL`, without empty ground above, below or beside them."""
     if camera == "follow":
         return FULL
-    extents = [_extent(log) for log in rollouts]
     cols, rows = _tiling(rollouts, camera, FULL)
     full = (FULL[0] // cols - 2, FULL[1] // rows - 2)
-    scale, head = _scale(extents, full), _head_of(full)[1]
-    if camera == "oblique":
-        high = head + max(_height(log, (full[0], full[1] - head)) for log in rollouts) / FILLED
-        return FULL[0], _even(rows * (high + 2), FULL[1])
-    shapes = [shape[::-1] if turns(shape[0] / shape[1], (full[0], full[1] - head)) else shape for shape in extents]
-    need = [max(sides) * scale / FILLED + 2 for sides in zip(*shapes, strict=True)]
-    wide, high = max(need[0], LEAST_TILE), need[1] + head
-    return _even(cols * wide, FULL[0]), _even(rows * high, FULL[1])
+    head = _head_of(full)[1]
+    view = (full[0], full[1] - head)
+    extent = np.max([_extent(log, camera, view) for log in rollouts], axis=0)
+    wide, high = extent / (FILLED if camera == "oblique" else np.max(extent / view))
+    width = FULL[0] if camera == "oblique" else _even(cols * max(wide + 2, LEAST_TILE), FULL[0])
+    return width, _even(rows * (high + head + 2), FULL[1])
 
 
-def _height(log: Rollout, view: tuple[int, int]) -> float:
-    """Return the height of a world in an oblique view of this size [px]."""
-    low, high = _region(log)
+def _extent(log: Rollout, camera: str, view: tuple[int, int]) -> Floats:
+    """Return width and height (2,) of the ground of a run in a view of this size [px]."""
+    scene = Scene.of(log)
+    low, high = scene.region(np.vstack([log.pose[:, :2], log.route]))
     corners = np.array([(x, y, 0.0) for x in (low[0], high[0]) for y in (low[1], high[1])])
-    return float(np.ptp(camera_for("oblique", low, high, drawn_height(Scene.of(log)), view).pixels(corners)[:, 1]))
+    return np.asarray(np.ptp(camera_for(camera, low, high, drawn_height(scene), view).pixels(corners), axis=0))
 
 
 def _even(length: float, most: int) -> int:
@@ -239,36 +237,13 @@ def _tiling(rollouts: Sequence[Rollout], camera: str, size: tuple[int, int]) -> 
         bounds = [log.record.task.world.bounds for log in rollouts] if camera == "oblique" else []
         widest = max([1.0, *((xmax - xmin) / (ymax - ymin) for xmin, ymin, xmax, ymax in bounds)])
         return _arrangement(count, size, widest)
-    extents = [_extent(log) for log in rollouts]
 
     def scale(cols: int) -> float:
-        return _scale(extents, (size[0] // cols - 2, size[1] // -(-count // cols) - 2))
+        tile = size[0] // cols - 2, size[1] // -(-count // cols) - 2
+        return min(float(np.prod(_extent(log, camera, (tile[0], tile[1] - _head_of(tile)[1])))) for log in rollouts)
 
     cols = max(range(1, count + 1), key=scale)
     return cols, -(-count // cols)
-
-
-def _region(log: Rollout) -> tuple[Floats, Floats]:
-    """Return the lower and the upper corner of the ground that a view of a run shows [m]."""
-    return Scene.of(log).region(np.vstack([log.pose[:, :2], log.route]))
-
-
-def _extent(log: Rollout) -> tuple[float, float]:
-    """Return width and height of the ground that a top view of a run shows [m]."""
-    low, high = _region(log)
-    wide, tall = (high - low).tolist()
-    return wide, tall
-
-
-def _scale(extents: Sequence[tuple[float, float]], tile: tuple[int, int]) -> float:
-    """Return the scale at which a tile shows the largest of the worlds [px/m]."""
-    view = (tile[0], tile[1] - _head_of(tile)[1])
-
-    def of(extent: tuple[float, float]) -> float:
-        wide, tall = extent[::-1] if turns(extent[0] / extent[1], view) else extent
-        return min(view[0] / wide, view[1] / tall)
-
-    return FILLED * min(map(of, extents))
 
 
 def _arrangement(count: int, size: tuple[int, int], proportion: float) -> tuple[int, int]:

@@ -1,6 +1,6 @@
 """Compositor of film frames: a static backdrop, rendered once, plus robot and movers in each frame.
 
-Ray casting draws the static bodies. The backdrop keeps its depth, so a frame costs only the pixels around robot and movers:
+The backdrop keeps its depth, so a frame costs only the pixels around robot and movers:
 their meshes are drawn and blended in where they are nearer. A moving camera needs a new backdrop for every frame.
 """
 
@@ -13,16 +13,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
 from antdrive.base.types import Floats
 from antdrive.views import colours
 from antdrive.views.colours import Colour
 from antdrive.views.film import _kernels_paint as kernels
 from antdrive.views.film.camera import Camera, Picture
-from antdrive.views.film.ground import capsules, dashes, kerb_width, paint_ground
+from antdrive.views.film.ground import capsules, dashes, kerb_width, paint_ground, ring
 from antdrive.views.film.lidar_view import BeamPainter, OwnMapPainter
-from antdrive.views.film.meshes import Part, cylinder, kerb, robot_height, robot_parts
-from antdrive.views.film.solids import Box, Solid, Solids, draw_solids, merged, overlap, placed
+from antdrive.views.film.meshes import Part, cylinder, join, kerb, robot_height, robot_parts
+from antdrive.views.film.solids import Box, Solid, draw_solids, merged, overlap, placed
 from antdrive.views.film.text import glow, put
 from antdrive.views.scene import Scene
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 HIDDEN_OPACITY = 0.16  # of a body behind a cylinder
 SHADOW_BLUR = 0.05  # softness of the shadow of a flat body [m]
-RING_SIDES, RING_OFF = 32, 0.05  # ring around a tracked mover: sides, distance from its surface [m]
+RING_OFF = 0.05  # distance of a ring from the surface of its tracked mover [m]
 FORECAST = 1.5  # horizon of the movers' drawn motion [s]
 
 
@@ -165,9 +166,7 @@ class Compositor:
         back, (x, y) = self.backdrop, grid.origin
         kernels.lay_field(frame, back.visible, back.inverse, np.ascontiguousarray(levels), x, y, grid.cell, tints)
         rows = capsules(path[:-1], path[1:], 1.6 * self.camera.pixel)
-        painted = np.zeros((*back.visible.shape, 4), dtype=np.uint8)
-        tints = np.tile(np.array(colours.SHELL, dtype=np.float64), (len(rows), 1))
-        kernels.draw_trail(frame, frame.copy(), back.visible, painted, back.forward, back.inverse, rows, tints)
+        back.blend(frame, rows, colours.SHELL, 1.0)
         for label in self._labels:
             self._put_label(frame, *label)
         return frame
@@ -197,14 +196,15 @@ class Compositor:
         return float(at[0]), float(at[1])
 
     def _render_still(self, camera: Camera) -> Backdrop:
-        image, depth, seg = self._solids.render(camera, self.fine, self._light)
         width, height = camera.size
-        visible = np.empty((height, width), dtype=np.float32)
-        ground = np.empty((height, width), dtype=np.bool_)
-        kernels.count_ground(seg, self.fine, visible, ground)
-        rgb = paint_ground(camera, self.scene, self._route, ground, self.tall, self._sun)
-        pixels = np.empty((height, width, 3), dtype=np.uint8)
-        kernels.resolve(rgb, image, seg, self.fine, visible, pixels)
+        image, depth, seg = draw_solids(self._solids, camera, (0, 0, width, height), self.fine, self._light)
+        bare = Image.fromarray(np.where(seg < 0, np.uint8(255), np.uint8(0))).reduce(self.fine)
+        visible = np.asarray(bare, dtype=np.float32) / np.float32(255)
+        rgb = paint_ground(camera, self.scene, self._route, visible > 0, self.tall, self._sun)
+        bodies = np.asarray(Image.fromarray(image).reduce(self.fine))
+        pixels = np.empty_like(bodies)
+        for k in range(3):
+            pixels[..., k] = np.minimum(rgb[..., k] * visible + bodies[..., k] + 0.5, 255)
         return Backdrop(camera, pixels, visible, depth, seg)
 
     def _paint_trail(self, rows: Floats, tints: Floats) -> None:
@@ -225,12 +225,10 @@ class Compositor:
 
     def _draw_tracked(self, frame: Picture, tracked: Floats) -> None:
         """Draw a ring at each mover's estimated position, and its path at the estimated velocity."""
-        turn = np.linspace(0, 2 * math.pi, RING_SIDES + 1)
         half = 1.2 * self.camera.pixel
-        circle = np.column_stack([np.cos(turn), np.sin(turn)])
-        rims = [np.array([x, y]) + (radius + RING_OFF) * circle for x, y, _, _, radius in tracked]
+        rims = [ring(x, y, radius + RING_OFF, half) for x, y, _, _, radius in tracked]
         places, ahead = tracked[:, :2], tracked[:, :2] + FORECAST * tracked[:, 2:4]
-        rows = [*(capsules(rim[:-1], rim[1:], half) for rim in rims), capsules(places, ahead, half)]
+        rows = [*rims, capsules(places, ahead, half)]
         self.backdrop.blend(frame, np.concatenate(rows), colours.TRACKED, 0.8, over=True)
 
     def _draw_shadows(self, frame: Picture, pose: Floats, movers: Floats) -> None:
@@ -293,14 +291,16 @@ def trail_width(scene: Scene, camera: Camera) -> float:
     return max(0.32 * scene.robot.footprint.radius, 4.0 * camera.pixel)
 
 
-def still_solids(scene: Scene, tall: Floats) -> Solids:
-    """Return all static bodies: the kerb in pieces, and cylinders of heights `tall` (N,) [m]."""
+def still_solids(scene: Scene, tall: Floats) -> list[Solid]:
+    """Return all static bodies: cylinders of heights `tall` (N,) [m], then the kerb."""
     width = kerb_width(scene)
-    kerbs = [mesh.vertices for mesh in kerb(scene.bounds, width, 0.8 * width)]
-    boxes = np.array([np.concatenate([corners.min(axis=0), corners.max(axis=0)]) for corners in kerbs])
-    cylinders = np.column_stack([scene.obstacles[:, :3], tall])
-    tints = [colours.UNSEEN if unseen else colours.OBSTACLE for unseen in scene.unseen]
-    return Solids.of(cylinders, tints, boxes, colours.KERB)
+    post, bounds = cylinder(1.0, 0.0, 1.0), join(*kerb(scene.bounds, width, 0.8 * width))
+    rows = zip(scene.obstacles.tolist(), tall.tolist(), scene.unseen.tolist(), strict=True)
+    posts = [
+        Solid(post, colours.UNSEEN if unseen else colours.OBSTACLE, np.column_stack([np.diag([r, r, z]), [x, y, 0.0]]))
+        for (x, y, r, _), z, unseen in rows
+    ]
+    return [*posts, Solid(bounds, colours.KERB, np.eye(3, 4))]
 
 
 def part_pose(

@@ -4,56 +4,37 @@ from __future__ import annotations
 
 import os
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any, NamedTuple
+from types import MappingProxyType
+from typing import Any
 from urllib.parse import quote
-
-import numpy as np
-import numpy.typing as npt
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import MAX_BYTES, format_size, read_bytes
-from antdrive.views.film.camera import CAMERAS, Picture
-from antdrive.views.film.planes import Planes
+from antdrive.views.film.camera import CAMERAS
 
-
-class Raw(NamedTuple):
-    """Raw video, the input of ffmpeg."""
-
-    options: tuple[str, ...]
-    converter: Callable[[tuple[int, int]], Callable[[Picture], npt.NDArray[np.uint8]]]  # of frames of a size to bytes
-
-
-class Encoder(NamedTuple):
-    """Input and options of ffmpeg for one film format."""
-
-    raw: Raw
-    options: tuple[str, ...]
-
-
-_BT709 = ("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709")
-_RGB = Raw(("-pix_fmt", "rgb24"), lambda _: np.ascontiguousarray)
-_YUV = Raw(("-pix_fmt", "yuv420p", "-color_range", "tv", *_BT709), Planes)
-
-#: Encoders by file suffix.
-ENCODERS: dict[str, Encoder] = {
-    ".mp4": Encoder(_YUV, ("-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-movflags", "+faststart")),
-    # A palette per frame: a common palette would hold the whole film in memory.
-    ".gif": Encoder(
-        _RGB,
-        (
+#: ffmpeg's options by file suffix.
+ENCODERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        ".mp4": (
+            *("-vf", "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p", "-color_range", "tv"),
+            *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"),
+            *("-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-movflags", "+faststart"),
+        ),
+        # A palette per frame: a common palette would hold the whole film in memory.
+        ".gif": (
             *("-vf", "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"),
             *("-c:v", "gif", "-loop", "0"),
         ),
-    ),
-    ".webp": Encoder(
-        _RGB,
-        ("-c:v", "libwebp_anim", "-pix_fmt", "yuv420p", "-quality", "70", "-compression_level", "2", "-loop", "0"),
-    ),
-}
+        ".webp": (
+            *("-c:v", "libwebp_anim", "-pix_fmt", "yuv420p", "-quality", "70"),
+            *("-compression_level", "2", "-loop", "0"),
+        ),
+    }
+)
 MOST_EMBEDDED = 8_000_000  # bytes of a film that notebooks embed; they link to larger ones
 STILLS: dict[str, dict[str, Any]] = {
     ".png": {},

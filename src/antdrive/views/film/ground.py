@@ -17,6 +17,8 @@ from antdrive.views.scene import Scene
 Mask = npt.NDArray[np.bool_]
 
 SHADOW_DEPTH = 0.30  # fraction of the light that the deepest shadow removes
+SHADOW_TINT = (1.0, 0.94, 0.80)  # of red, green and blue: outdoor shadows are slightly blue
+RING_SIDES = 64  # of a circle
 
 
 def paint_ground(
@@ -37,7 +39,8 @@ def paint_ground(
     cylinders = scene.obstacles.copy()
     cylinders[:, 3] = tall
     kernels.cast_shadows(shade, brush.forward, brush.inverse, cylinders, *sun, SHADOW_DEPTH)
-    kernels.multiply(brush.rgb, shade)
+    for channel, tint in enumerate(SHADOW_TINT):
+        brush.rgb[..., channel] *= 1 - tint * (1 - shade)
     if len(route) > 1:
         brush.capsules(dashes(route, line), ROUTE, 0.85)
     brush.start(scene, line)
@@ -65,6 +68,13 @@ def capsules(starts: Floats, ends: Floats, half: float | Floats) -> Floats:
     return np.ascontiguousarray(np.column_stack([starts, ends, np.full(len(starts), half)]))
 
 
+def ring(x: float, y: float, radius: float, half: float) -> Floats:
+    """Return capsules (N, 5) that draw a circle with half the width of a line [m]."""
+    turn = np.linspace(0, 2 * math.pi, RING_SIDES + 1)
+    rim = np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
+    return capsules(rim[:-1], rim[1:], half)
+
+
 def dashes(line: Floats, width: float) -> Floats:
     """Return capsules (M, 5) that draw a polyline (N, 2) dashed with a line width [m]."""
     on, off = 7 * width, 5 * width
@@ -85,7 +95,7 @@ class _Brush:
         self.forward = camera.ground
         self.inverse = np.linalg.inv(self.forward)
         self.inside = np.empty_like(ground)  # the ground within the world's bounds
-        self.rgb = np.empty((height, width, 3), dtype=np.float32)
+        self.rgb = np.zeros((height, width, 3), dtype=np.float32)
         self.cover = np.zeros((height, width), dtype=np.float32)
 
     def blend(self, colour: Colour, strength: float) -> None:
@@ -95,11 +105,6 @@ class _Brush:
     def capsules(self, rows: Floats, colour: Colour, strength: float) -> None:
         """Paint capsules (N, 5): ax, ay, bx, by, half width [m]."""
         kernels.cover_capsules(self.cover, self.forward, self.inverse, rows)
-        self.blend(colour, strength)
-
-    def rings(self, rows: list[tuple[float, float, float, float]], colour: Colour, strength: float) -> None:
-        """Paint circles: x, y, radius, half width of the line [m]."""
-        kernels.cover_rings(self.cover, self.forward, self.inverse, np.array(rows, dtype=np.float64))
         self.blend(colour, strength)
 
     def zones(self, scene: Scene, line: float) -> None:
@@ -115,7 +120,7 @@ class _Brush:
         """Mark the start with a ring of the robot's size and a tick along its heading."""
         x, y, yaw = scene.start
         radius = scene.robot.footprint.radius + line
-        self.rings([(x, y, radius, 0.8 * line)], START, 0.9)
+        self.capsules(ring(x, y, radius, 0.8 * line), START, 0.9)
         dx, dy = math.cos(yaw), math.sin(yaw)
         tick = [(x + radius * dx, y + radius * dy, x + 1.5 * radius * dx, y + 1.5 * radius * dy, 0.8 * line)]
         self.capsules(np.array(tick), START, 0.9)
@@ -124,8 +129,8 @@ class _Brush:
         """Mark the goal's tolerance disc and its centre."""
         (x, y), radius = scene.goal, scene.goal_tolerance
         self.capsules(np.array([(x, y, x, y, radius)]), GOAL, 0.22)
-        self.rings([(x, y, radius, 0.9 * line)], GOAL, 0.95)
-        self.rings([(x, y, 0.5 * radius, 0.5 * line)], GOAL, 0.6)
+        self.capsules(ring(x, y, radius, 0.9 * line), GOAL, 0.95)
+        self.capsules(ring(x, y, 0.5 * radius, 0.5 * line), GOAL, 0.6)
         self.capsules(np.array([(x, y, x, y, max(0.10 * radius, 1.4 * line))]), GOAL, 0.95)
 
 

@@ -95,7 +95,7 @@ class Layout:
 
 
 class Band:
-    """Band below the picture. Its constant content is drawn once, a number or status when it changes."""
+    """Band below the picture. Its constant content is drawn once, numbers and status when they change."""
 
     def __init__(
         self,
@@ -129,31 +129,20 @@ class Band:
             draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=colours.MUTED)
         if layout.rows:
             _draw_rows(draw, legend, layout)
-        self._shown: tuple[Values, tuple[str, colours.Colour] | None] = ([("", False)] * 4, None)
+        self._shown: tuple[Values, tuple[str, colours.Colour]] | None = None
         self._picture = np.array(self._blank)
 
     def draw(self, values: Values, status: tuple[str, colours.Colour], out: Picture) -> None:
         """Draw the band of one frame into `out` (h, W, 3), with its four numbers and its status."""
-        shown, shown_status = self._shown
-        if status != shown_status:
-            self._picture = np.array(self._blank)
-            shown = [("", False)] * len(values)
-            plate_ = pill(status[0], round(1.08 * self.layout.unit), status[1])
-            put(self._picture, plate_, self.layout.width - self.layout.unit - plate_.shape[1], 0.5 * self.layout.unit)
-        for field, value, before in zip(self._fields, values, shown, strict=True):
-            if value != before:
-                self._draw_number(*field, *value)
-        self._shown = values, status
+        if (values, status) != self._shown:
+            self._shown = values, status
+            image, unit = self._blank.copy(), self.layout.unit
+            draw, large = ImageDraw.Draw(image), font(round(1.4 * unit), True)
+            for (x, y), (text, bad) in zip(self._fields, values, strict=True):
+                draw.text((x, y + 1.15 * unit), text, font=large, fill=colours.BAD if bad else colours.INK)
+            self._picture, label = np.array(image), pill(status[0], round(1.08 * unit), status[1])
+            put(self._picture, label, self.layout.width - unit - label.shape[1], 0.5 * unit)
         out[:] = self._picture
-
-    def _draw_number(self, x: int, y: int, text: str, bad: bool) -> None:
-        """Draw a number in place of the one before."""
-        size = round(1.4 * self.layout.unit)
-        top, right = y + self.layout.unit, x + self.layout.fields[1]
-        patch = self._blank.crop((x, top, min(right, self.layout.width), min(top + 2 * size, self.layout.height)))
-        place = (0, y + 1.15 * self.layout.unit - top)
-        ImageDraw.Draw(patch).text(place, text, font=font(size, True), fill=colours.BAD if bad else colours.INK)
-        self._picture[top : top + patch.height, x : x + patch.width] = np.asarray(patch)
 
 
 def _widest_status(unit: int) -> int:

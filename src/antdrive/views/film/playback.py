@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from antdrive.base.types import Floats
-from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.timeline import Timeline
+from antdrive.sim.policy import Trigger
 from antdrive.views.scene import Scene, contact_point, jumps
 
 CAMERA_WINDOW = 0.6  # half the window over which a following camera's target is averaged [s]
@@ -30,7 +30,7 @@ class ReplanEvent(NamedTuple):
     @property
     def caption(self) -> str:
         """Caption of the replan; empty for a robot that re-plans at every cell."""
-        if self.trigger == DECISION:
+        if self.trigger == Trigger.DECISION:
             return ""
         return f"{'new route' if self.solved else 'no new route'}: {self.trigger}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ from antdrive.base.types import Floats
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.colours import CONTACT, GOAL, OUTCOME_LABELS, ROUTE, START, Colour
-from antdrive.views.film import _kernels_paint as kernels
 from antdrive.views.film import overlay
 from antdrive.views.film.camera import Camera, Picture, camera_for
 from antdrive.views.film.compositor import Compositor, drawn_height, has_glow
@@ -41,10 +41,9 @@ class Shot:
         self.outcome = rollout.outcome
         self._follows = self.options.camera == "follow"
         self._tracks_movers = not planning and len(rollout.tracks) > 0
-        self._own_map = (
-            OwnMapPainter(rollout, scene) if not planning and not scene.mapped and len(rollout.scans) else None
-        )
-        self._fan = self._own_map or (BeamPainter(rollout) if not planning and len(rollout.scans) else None)
+        scans = not planning and len(rollout.scans) > 0
+        self._own_map = OwnMapPainter(rollout, scene) if scans and not scene.mapped else None
+        self._fan = self._own_map or (BeamPainter(rollout) if scans else None)
         replans = not planning and any(event.caption for event in self.playback.replans)
         legend = self._lay_out(rollout, planning=planning, replans=replans, bare=bare)
         planner = rollout.record.planner.name
@@ -224,7 +223,9 @@ class Shot:
         fresh = max(0.0, 1.0 - age / flash)
         edge, tint = (0.75, 0.0) if last else (fresh, 0.25 * fresh)
         if edge > 0:
-            kernels.flash(view, np.array(CONTACT, dtype=np.float64), 0.9 * self._layout.unit, edge, tint)
+            share, border = np.full((*view.shape[:2], 1), edge), math.ceil(0.9 * self._layout.unit)
+            share[border:-border, border:-border] = tint
+            view[:] = view + (CONTACT - view.astype(np.float64)) * share + 0.5
 
 
 def caption(log: Rollout) -> str:

@@ -13,7 +13,6 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from antdrive.views.colours import Colour
-from antdrive.views.film import _kernels_paint as kernels
 from antdrive.views.film.camera import Picture
 
 Sprite: TypeAlias = npt.NDArray[np.uint8]  # (h, w, 4) RGBA
@@ -72,7 +71,10 @@ def label(text: str, size: int, colour: Colour) -> Sprite:
 
 def put(frame: Picture, sprite: Sprite, left: float, top: float) -> None:
     """Blend a sprite into a frame, with its upper left corner at a pixel; parts outside are cut off."""
-    kernels.put_sprite(frame, sprite, round(left), round(top), 1.0)
+    x, y, (high, wide, _) = round(left), round(top), sprite.shape
+    below = frame[max(y, 0) : max(y + high, 0), max(x, 0) : max(x + wide, 0)]
+    part = sprite[max(-y, 0) :, max(-x, 0) :][: below.shape[0], : below.shape[1]].astype(np.float32)
+    below[:] = below + (part[..., :3] - below) * part[..., 3:] / 255 + 0.5
 
 
 def pill(text: str, size: int, colour: Colour, more: Sequence[str] = (), small: int = 0) -> Sprite:

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image
 
 from antdrive.base.atomic import atomic_write
@@ -174,11 +173,9 @@ def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable
     import imageio_ffmpeg
 
     rate = str(Fraction(fps).limit_denominator(100_000))
-    encoder = ENCODERS[path.suffix.lower()]
-    converted = encoder.raw.converter(size)
     command = [
-        *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "error", "-f", "rawvideo", *encoder.raw.options),
-        *("-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "-", "-an", *encoder.options, str(path)),
+        *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"),
+        *("-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "-", "-an", *ENCODERS[path.suffix.lower()], str(path)),
     ]
     with tempfile.TemporaryFile() as messages:
         # In its own session: Ctrl-C reaches only this process, which stops ffmpeg and removes the file.
@@ -193,7 +190,7 @@ def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable
         pipe = process.stdin
         assert pipe is not None
         try:
-            yield lambda picture: _write_all(pipe, converted(picture))
+            yield lambda picture: _write_all(pipe, picture)
             pipe.close()
             process.wait()
         except (BrokenPipeError, ConnectionResetError):
@@ -209,8 +206,8 @@ def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable
             raise OSError(f"ffmpeg failed to write the film ({lines[0] if lines else process.returncode})")
 
 
-def _write_all(pipe: IO[bytes], frame: npt.NDArray[np.uint8]) -> None:
-    left = frame.data.cast("B")
+def _write_all(pipe: IO[bytes], frame: Picture) -> None:
+    left = np.ascontiguousarray(frame).data.cast("B")
     while left:
         left = left[pipe.write(left) :]
 

@@ -27,19 +27,11 @@ from antdrive.runs.statistics.price import prices
 from antdrive.runs.statistics.run_table import HASHES, RunTable
 from antdrive.runs.statistics.significance import FLIPS
 from antdrive.runs.statistics.success import PlannerSuccess, common_medians, success_table
-from antdrive.sim.facts import FACTS
 from antdrive.sim.log.metrics import METRICS
 from antdrive.views.pages.quotes import disagreements, quotes
 from antdrive.views.pages.rendering import percent, percents
 
 DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
-TITLES = {
-    "plan_s": "planning time",
-    "drive_wall_s": "wall time of the drive",
-    "path_length_m": "planned length",
-    "bound_m": "certified clearance",
-}
-UNITS = ("_rad_per_m", "_m2", "_m", "_s", "_hz")  # suffixes of names
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +59,8 @@ class CampaignSummary:
     @property
     def sentences(self) -> list[str]:
         """A sentence to quote for each measure, then one for each cause of intervals and p that disagree."""
-        titled = {measure_title(name): rows for name, rows in self.comparisons.items()}
-        stated = [one for title, rows in titled.items() for one in quotes(self.paired, title, rows)]
-        return [*stated, *disagreements(titled)]
+        stated = [sentence for rows in self.comparisons.values() for sentence in quotes(self.paired, rows)]
+        return [*stated, *disagreements(self.comparisons)]
 
     @property
     def notes(self) -> list[str]:
@@ -158,14 +149,6 @@ def _allowances(paired: PairedRuns, against: str | None, allow: Mapping[str, flo
 def known_metrics(paired: PairedRuns, names: Sequence[str]) -> list[str]:
     """Return the metrics that at least one successful run has."""
     return [name for name in names if np.isfinite(paired.values(name)).any()]
-
-
-def measure_title(name: str) -> str:
-    """Return a column's heading with its unit."""
-    unit = FACTS[name].unit if name in FACTS else ""
-    short = next((name.removesuffix(suffix) for suffix in UNITS if unit and name.endswith(suffix)), name)
-    plain = TITLES.get(name, short.removeprefix("option.").replace("_", " "))
-    return plain if unit in ("", "1") else f"{plain} [{unit}]"
 
 
 NAMED = 3  # planners named in a card

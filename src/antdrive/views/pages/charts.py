@@ -20,7 +20,8 @@ from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.success import StepCurve, distributions, performance_profiles
 from antdrive.views.colours import INK, MUTED, LabelStyle, hexed
 from antdrive.views.figures.canvas import PRINTED, new_figure, save_figure, styled
-from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics, measure_title
+from antdrive.views.pages.campaign_summary import CampaignSummary, known_metrics
+from antdrive.views.pages.rendering import Quantity, measure_title
 
 WORST = 10_000.0  # right end of a profile, as a multiple of the best value
 WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]
@@ -29,7 +30,6 @@ FEWEST = 3  # values per box
 MOST_PANELS = 24  # planners with box plots
 MOST_DOTS = 60  # outliers per box
 BINS = 4  # groups of world sizes
-CURVE_POINTS = 400  # per curve, at most
 PROFILED = ("driven_length_m", "plan_s")
 DISTRIBUTED = ("duration_s", "plan_s")
 BOXED = ("plan_s", "gap_to_grid_optimum")
@@ -60,7 +60,7 @@ def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> l
                 charts.append(_profile(name, performance_profiles(values), int(whole.sum()), styles))
     if whole.any():
         for name in known_metrics(paired, DISTRIBUTED):
-            charts.append(_distribution(name, distributions(paired.values(name)[whole]), int(whole.sum()), styles))
+            charts.append(_distribution(name, distributions(_values(paired, name)[whole]), int(whole.sum()), styles))
     common = np.asarray(paired.success.all(axis=1)) & whole
     if common.any():
         charts += [
@@ -114,8 +114,8 @@ def _steps(
 ) -> None:
     for k, (curve, style) in enumerate(zip(curves, styles, strict=True)):
         inside = curve.x <= high
-        x, share = _thinned(curve.x[inside], curve.fraction[inside], low, high, log)
-        x = np.concatenate([[low], x, [high]])
+        share = curve.fraction[inside]
+        x = np.concatenate([[low], curve.x[inside], [high]])
         share = np.concatenate([[0.0], share, share[-1:] if len(share) else [0.0]])
         (line,) = axes.step(x, share, where="post", color=style.light, ls=style.dash, lw=1.6)
         line.set_gid(f"planner-{k}")
@@ -135,16 +135,6 @@ def _write_identical(axes: Any, words: str) -> None:
     axes.text(0.5, 0.97, words, ha="center", va="top", transform=axes.transAxes, fontsize=size)
 
 
-def _thinned(x: Floats, share: Floats, low: float, high: float, log: bool) -> tuple[Floats, Floats]:
-    """Thin a curve to at most `CURVE_POINTS` steps, keeping the last step per pixel."""
-    if len(x) <= CURVE_POINTS:
-        return x, share
-    place = (np.log(x / low) / np.log(high / low)) if log else (x - low) / (high - low)
-    pixel = np.floor(CURVE_POINTS * place)
-    last = np.append(np.diff(pixel) > 0, True)
-    return x[last], share[last]
-
-
 def _size_boxes(paired: PairedRuns, name: str, common: Flags, styles: Sequence[LabelStyle]) -> list[Chart]:
     """Return box plots by world size, a panel per planner, over instances that all planners solved."""
     for column in (AREA, OPTIMUM):
@@ -157,7 +147,7 @@ def _size_boxes(paired: PairedRuns, name: str, common: Flags, styles: Sequence[L
         return []
     common = common & np.isfinite(sizes)
     group = np.clip(np.searchsorted(edges, sizes, side="right") - 1, 0, len(edges) - 2)
-    values = paired.values(name)
+    values = _values(paired, name)
     groups = [[values[common & (group == g), k] for g in range(len(edges) - 1)] for k in range(len(paired.planners))]
     exact = edges[-1] == edges[-2]
     labels = [_round(edge) for edge in edges[:-1]] if exact else [f"≤{_round(edge)}" for edge in edges[1:]]
@@ -205,7 +195,7 @@ def _boxes_of_option(
     common = paired.success[:, mine].all(axis=1) & paired.counted(*mine)
     charts = []
     for name in known_metrics(paired, BOXED):
-        boxes = [paired.values(name)[common, k] for k in mine]
+        boxes = [_values(paired, name)[common, k] for k in mine]
         if common.sum() < FEWEST:
             continue
 
@@ -331,8 +321,13 @@ def _svg(figure: Figure, styles: Sequence[LabelStyle]) -> str:
     return re.sub("#[0-9a-f]{6}", lambda match: f"var({colours[match[0]]})" if match[0] in colours else match[0], text)
 
 
+def _values(paired: PairedRuns, name: str) -> Floats:
+    """Return a metric's values in the unit of its title."""
+    return Quantity.of(name).factor * paired.values(name)
+
+
 def _plain(name: str) -> str:
-    return measure_title(name).partition(" [")[0]
+    return Quantity.of(name).title
 
 
 def _round(value: float) -> str:

@@ -5,34 +5,31 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+from antdrive.base.errors import amount
 from antdrive.runs.statistics.comparison import ALPHA, SUCCESS, PairedComparison
 from antdrive.runs.statistics.pairing import PairedRuns
-from antdrive.views.pages.rendering import percent, percents, probability, short
+from antdrive.views.pages.rendering import Quantity, percent, percents, probability
 
 
-def quotes(paired: PairedRuns, title: str, rows: Sequence[PairedComparison]) -> Iterator[str]:
+def quotes(paired: PairedRuns, rows: Sequence[PairedComparison]) -> Iterator[str]:
     """Yield a sentence about each pair with the reference planner; of all pairs, about the one with the smallest p."""
     tested = _tested(rows)
     if not tested:
         return
     shared = set.intersection(*({row.first, row.second} for row in tested))
     for row in tested if shared else [min(tested, key=lambda one: one.decisive_p)]:
-        yield _sentence(paired, title, row, len(tested))
+        yield _sentence(paired, row, len(tested))
 
 
 def disagreements(tables: Mapping[str, Sequence[PairedComparison]]) -> Iterator[str]:
-    """Yield a sentence for every cause of an interval and a p that disagree, with the pairs and measures.
-
-    Args:
-        tables: the comparisons by title of their measure
-    """
+    """Yield a sentence for every cause of an interval and a p that disagree, with the pairs and measures."""
     where: dict[str, dict[str, list[str]]] = {}
-    for title, rows in tables.items():
+    for measure, rows in tables.items():
         tested = _tested(rows)
         for one in tested:
             if why := _disagreement(one, len(tested)):
                 pair = f"{one.first} and {one.second}"
-                where.setdefault(why, {}).setdefault(pair, []).append(title.partition(" [")[0])
+                where.setdefault(why, {}).setdefault(pair, []).append(Quantity.of(measure).title)
     for why, pairs in where.items():
         places = "; ".join(f"{pair}: {', '.join(titles)}" for pair, titles in pairs.items())
         yield f"{why} ({places})."
@@ -42,7 +39,7 @@ def _tested(rows: Sequence[PairedComparison]) -> list[PairedComparison]:
     return [row for row in rows if not math.isnan(row.decisive_p)]
 
 
-def _sentence(paired: PairedRuns, title: str, row: PairedComparison, tested: int) -> str:
+def _sentence(paired: PairedRuns, row: PairedComparison, tested: int) -> str:
     """Return the size of the difference with its interval, tests and correction."""
     tests = [
         "exact McNemar test" if row.measure == SUCCESS else "Wilcoxon's signed rank test",
@@ -53,11 +50,11 @@ def _sentence(paired: PairedRuns, title: str, row: PairedComparison, tested: int
         for test, p in zip(tests, (row.p_holm, row.p_worlds_holm), strict=True)
         if not math.isnan(p)
     ]
-    over = f"n = {_counted(row.pairs, 'pair')} in {_counted(row.worlds, 'world')}"
-    return f"{_effect(paired, title, row, over)}; {', '.join(found)} (Holm, {_counted(tested, 'pair')})."
+    over = f"n = {amount(row.pairs, 'pair')} in {amount(row.worlds, 'world')}"
+    return f"{_effect(paired, row, over)}; {', '.join(found)} (Holm, {amount(tested, 'pair')})."
 
 
-def _effect(paired: PairedRuns, title: str, row: PairedComparison, over: str) -> str:
+def _effect(paired: PairedRuns, row: PairedComparison, over: str) -> str:
     """Return the size of the difference with its interval."""
     i, j = paired.planners.index(row.first), paired.planners.index(row.second)
     mask = paired.counted(i, j)
@@ -69,11 +66,12 @@ def _effect(paired: PairedRuns, title: str, row: PairedComparison, over: str) ->
             f"{row.first} succeeded in {shares[0]} % and {row.second} in {shares[1]} % of {over}: difference "
             f"{percent(row.difference)} points, 95 % interval {percents(row.interval)} ({method})"
         )
-    name, _, unit = title.removesuffix("]").partition(" [")
-    median = f"{short(row.difference)} {unit}".rstrip()
+    quantity = Quantity.of(row.measure)
+    median = f"{quantity.text(row.difference)} {quantity.unit}".rstrip()
+    low, high = map(quantity.text, row.interval)
     return (
-        f"{name}, {row.first} minus {row.second}: median {median} over {over} that both "
-        f"solved, 95 % interval {short(row.interval.low)} to {short(row.interval.high)} (bootstrap over worlds)"
+        f"{quantity.title}, {row.first} minus {row.second}: median {median} over {over} that both "
+        f"solved, 95 % interval {low} to {high} (bootstrap over worlds)"
     )
 
 
@@ -96,7 +94,3 @@ def _disagreement(row: PairedComparison, tested: int) -> str:
 def _equals(p: float) -> str:
     text = probability(p)
     return text if text.startswith("<") else f"= {text}"
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 from antdrive.base.files import relative
+from antdrive.base.tables import markdown_text
 from antdrive.base.version import __version__
 from antdrive.runs.statistics.intervals import Interval
+from antdrive.sim.facts import FACTS, Fact
 
 if TYPE_CHECKING:
     import jinja2
@@ -48,20 +50,78 @@ def percents(interval: Interval) -> str:
     return NONE if math.isnan(interval.low) else f"{percent(interval.low)} to {percent(interval.high)}"
 
 
+TITLES = {
+    "plan_s": "planning time",
+    "drive_wall_s": "wall time of the drive",
+    "path_length_m": "planned length",
+    "bound_m": "certified clearance",
+    "physics_hz": "physics rate",
+    "control_hz": "control rate",
+}
+UNITS = ("_rad_per_m", "_m2", "_m", "_s", "_hz")  # suffixes of names
+#: Units in which pages show facts, and their factors, where these are not the facts' own.
+SHOWN_IN = {
+    "plan_s": ("ms", 1000.0),
+    "gap_to_grid_optimum": ("%", 100.0),
+    "gap_to_euclidean_optimum": ("%", 100.0),
+}
+
+
+class Quantity(NamedTuple):
+    """How pages show the values of a column."""
+
+    title: str
+    unit: str  # empty without one
+    factor: float  # from the column's own unit
+
+    @classmethod
+    def of(cls, name: str) -> Quantity:
+        """Return the quantity of a column."""
+        fact = _fact_of(name)
+        unit = "" if fact is None or fact.unit == "1" else fact.unit
+        plain = next((name.removesuffix(suffix) for suffix in UNITS if unit and name.endswith(suffix)), name)
+        title = TITLES.get(name, plain.removeprefix("option.").replace("_", " "))
+        return cls(title, *SHOWN_IN.get(name, (unit, 1.0)))
+
+    @property
+    def heading(self) -> str:
+        """Title with unit."""
+        return f"{self.title} [{self.unit}]" if self.unit else self.title
+
+    def text(self, value: float) -> str:
+        """Format a value without its unit."""
+        return short(self.factor * value)
+
+
+def measure_title(name: str) -> str:
+    """Return a column's heading with its unit."""
+    return Quantity.of(name).heading
+
+
+def _fact_of(name: str) -> Fact | None:
+    """Return the fact that a column or a setting holds; a setting's name has no unit."""
+    return next((FACTS[known] for known in (name, f"{name}_m", f"{name}_s") if known in FACTS), None)
+
+
+def with_unit(name: str, value: Any) -> tuple[str, str]:
+    """Return the title of a fact and its value with the unit; another name and value as they are."""
+    quantity, known = Quantity.of(name), number(value)
+    if _fact_of(name) is None:
+        return name, shown(value)
+    if known is None:
+        return quantity.title, shown(value)
+    return quantity.title, f"{shown(round(quantity.factor * known, 6) + 0.0)} {quantity.unit}".rstrip()
+
+
 def short(value: float) -> str:
     """Format a number with three significant digits."""
     if not math.isfinite(value):
         return NONE if math.isnan(value) else "∞"
     if value == 0:
         return "0"
-    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    digits = max(0, 2 - math.floor(math.log10(abs(float(f"{value:.2e}")))))
     text = f"{value:.{min(digits, 6)}f}"
     return "0" if float(text) == 0 else text
-
-
-def with_interval(value: float, interval: Interval) -> str:
-    """Format a number with its interval in brackets."""
-    return f"{short(value)} ({short(interval.low)} to {short(interval.high)})"
 
 
 def probability(p: float) -> str:
@@ -99,25 +159,9 @@ def shown(value: Any, longest: int = LONGEST) -> str:
 SIGNIFICANT = 6  # significant digits of numbers in a page
 
 
-def page_data(
-    columns: Sequence[Mapping[str, Any]],
-    shown: Sequence[str],
-    titles: Mapping[str, str],
-    good: Sequence[bool],
-    planners: Sequence[str],
-    **more: Any,
-) -> str:
-    """Return the runs of a page as JSON for a script element."""
-    data = {
-        "rows": len(good),
-        "planners": list(planners),
-        "columns": columns,
-        "shown": shown,
-        "titles": titles,
-        "good": [int(value) for value in good],
-        **more,
-    }
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+def script_json(value: Any) -> str:
+    """Return JSON for a script element."""
+    text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
@@ -126,7 +170,12 @@ def json_column(name: str, values: Sequence[Any]) -> dict[str, Any] | None:
     if all(value is None for value in values):
         return None
     if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
-        return {"name": name, "numbers": [_number(value) for value in values]}
+        factor = Quantity.of(name).factor
+        return {
+            "name": name,
+            "numbers": [_number(value) for value in values],
+            **({} if factor == 1 else {"factor": factor}),
+        }
     return {"name": name, **json_texts([None if value is None else str(value) for value in values])}
 
 
@@ -168,18 +217,13 @@ def _environment() -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
         autoescape=jinja2.select_autoescape(["html.j2"]),
     )
-    environment.filters |= {"md": markdown_text, "fence": fence_for}
+    environment.filters |= {"md": lambda value: markdown_text(str(value)), "fence": fence_for}
     return environment
 
 
 def link_to(path: Path, base: Path) -> str:
     """Return a file's path relative to the page's folder, quoted for a URL."""
     return quote(relative(path.resolve(), base.resolve()))
-
-
-def markdown_text(value: object) -> str:
-    """Escape a text for Markdown, its tables and HTML blocks."""
-    return re.sub(r"[&<>|`*_~\[\]\\@#]", lambda found: f"&#{ord(found[0])};", str(value))
 
 
 def fence_for(code: str) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import itertools
 import os
+import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,17 +31,19 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
 from antdrive.views.pages import attachments
-from antdrive.views.pages.campaign_summary import CampaignSummary, headline, measure_title, summarise
+from antdrive.views.pages.campaign_summary import CampaignSummary, headline, summarise
 from antdrive.views.pages.rendering import (
     NONE,
+    Quantity,
     TextTable,
     json_column,
     json_texts,
     link_to,
-    page_data,
+    measure_title,
     rendered,
-    short,
+    script_json,
     shown,
+    with_unit,
 )
 from antdrive.views.pages.reported_runs import ReportedRun, find_runs, reported_run, run_table
 from antdrive.views.pages.tables import (
@@ -69,7 +72,7 @@ MEASURED: Mapping[str, str] = MappingProxyType(
     {
         "path_length_m": "length of the planned path, before smoothing",
         "driven_length_m": "",
-        "gap_to_euclidean_optimum": "excess of the smoothed route over the shortest path around the no-go area, as a fraction",
+        "gap_to_euclidean_optimum": "excess of the smoothed route over the shortest path around the no-go area",
         "duration_s": "",
         "min_clearance_m": "smallest distance to an obstacle at any logged pose",
         "bound_m": "clearance guaranteed by the certificate, including between logged poses",
@@ -126,10 +129,15 @@ class Report:
         names = ("world", "planner", *self.differing, "outcome", "test", "seed", *MEASURED)
         return [name for name in names if any(value is not None for value in self.table.columns.get(name, ()))]
 
+    @functools.cached_property
+    def quantities(self) -> dict[str, Quantity]:
+        """How the columns are shown."""
+        return {name: Quantity.of(name) for name in self.table.columns}
+
     def heading(self, run: ReportedRun) -> str:
         """Return the heading of a run's section: the run, and its settings that differ from another run's."""
         settings = [name for name in self.differing if name != "robot" and not name.startswith("option.")]
-        known = [f"{measure_title(name)} {shown(run.row[name])}" for name in settings if run.row[name] is not None]
+        known = [" ".join(with_unit(name, run.row[name])) for name in settings if run.row[name] is not None]
         return " · ".join(
             [*(str(run.row[name]) for name in ("world", "planner", "robot")), f"seed {run.row['seed']}", *known]
         )
@@ -311,14 +319,14 @@ def _markdown(report: Report, columns: Sequence[str]) -> str:
             "page.md.j2",
             **content,
             tables=[*tables, *([_text_table(report, ordered[:rows])] if rows else [])],
-            words=(*WORDS, *(measure_title(name) for name in report.shown if report.table.worded(name))),
+            words=(*WORDS, *(report.quantities[name].heading for name in report.shown if report.table.worded(name))),
             most=max(rows, MARKDOWN_ROWS),
             uncounted=outcome_counts([outcomes[k] for k in ordered[rows:]]) if report.runs else "",
             detailed=[report.runs[k] for k in ordered[:details]],
             undetailed=len(report.runs) - details,
         )
         if len(text.encode()) <= MARKDOWN_BYTES or not rows:
-            return text
+            return re.sub(r"\n{3,}", "\n\n", text.strip()) + "\n"
         rows, details = (rows, details // 2) if details > ENOUGH_DETAILS else (rows // 2, details // 2)
 
 
@@ -331,12 +339,12 @@ def _text_table(report: Report, rows: Sequence[int]) -> TextTable:
         if name == "outcome":
             return f"{'✅' if success[row] else '❌'} {value.replace('_', ' ')}"
         if isinstance(value, float):
-            return short(value)
+            return report.quantities[name].text(value)
         return NONE if value is None else str(value)
 
     return TextTable(
         "Runs",
-        tuple(map(measure_title, report.shown)),
+        tuple(report.quantities[name].heading for name in report.shown),
         [tuple(cell(name, row) for name in report.shown) for row in rows],
     )
 
@@ -386,15 +394,18 @@ def report_data(report: Report, base: str) -> str:
     columns = [json_column(name, table.columns[name]) for name in table.columns if name != "command"]
     commands = {"name": "command", **_commands(table)} if report.summary else None
     kept = [column for column in (*columns, commands) if column is not None]
-    return page_data(
-        kept,
-        report.shown,
-        {column["name"]: measure_title(column["name"]) for column in kept},
-        [bool(value) for value in table.success],
-        report.planners,
-        sentences=SENTENCES,
-        base=base,
-        sections=bool(report.runs),
+    return script_json(
+        {
+            "rows": len(table),
+            "planners": list(report.planners),
+            "columns": kept,
+            "shown": report.shown,
+            "titles": {name: quantity.heading for name, quantity in report.quantities.items()},
+            "good": [int(value) for value in table.success],
+            "sentences": SENTENCES,
+            "base": base,
+            "sections": bool(report.runs),
+        }
     )
 
 
@@ -443,7 +454,7 @@ def _common(report: Report) -> dict[str, Any]:
         "notes": [*summary.sentences, *summary.notes] if summary else [],
         "definitions": {name: METRICS[name].definition for name in compared if name in METRICS},
         "column_notes": [
-            (measure_title(name), note) for name, note in MEASURED.items() if note and name in report.shown
+            (report.quantities[name].title, note) for name, note in MEASURED.items() if note and name in report.shown
         ],
         "heading": report.heading,
     }

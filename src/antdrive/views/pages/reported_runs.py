@@ -22,7 +22,7 @@ from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
 from antdrive.sim.recorded import command_of
 from antdrive.sim.verifying import false_claims, read_result
-from antdrive.views.pages.rendering import number, shown
+from antdrive.views.pages.rendering import number, shown, with_unit
 
 LONGEST_COMMAND = 4000  # characters
 LISTED_SIGHTS = 40  # number of listed cylinders, those with the closest approaches
@@ -102,10 +102,15 @@ def logged_run(rollout: Rollout, result: Mapping[str, Any], name: str, folder: P
     certificate, record = log.certificate, rollout.record
     outcome, plain = record.outcome, record.as_dict()
     settings = {"route": plain["smoothing"]["made"]}
-    settings |= {key: plain[key] for key in ("noise", "margin", "inflate", "cell")}
+    settings |= {
+        "noise": plain["noise"],
+        "margin": plain["margin"],
+        "inflate": f"{plain['inflate']:g} m",
+        "cell": plain["cell"],
+    }
     settings |= {key: plain[key] for key in ("physics_hz", "control_hz", "time_limit")}
     if has_default(record):
-        settings["margin"] = f"{settings['margin']:g}, the default for this noise and route"
+        settings["margin"] = f"{settings['margin']:g} m, the default for this noise and route"
     if len(rollout.scans) and record.robot.lidar is not None:
         settings["scans"] = f"{len(rollout.scans)} of {record.robot.lidar.beams} beams"
     proved = f"at least {certificate.bound:.4f} m of clearance, including between logged poses."
@@ -232,4 +237,4 @@ def _sight_pairs(sights: Sequence[Sighting]) -> list[tuple[str, str]]:
 
 
 def _pairs(values: Any) -> list[tuple[str, str]]:
-    return [(shown(key), shown(value)) for key, value in values.items()] if isinstance(values, Mapping) else []
+    return [with_unit(shown(key), value) for key, value in values.items()] if isinstance(values, Mapping) else []

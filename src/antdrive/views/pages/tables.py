@@ -6,7 +6,7 @@ import csv
 import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,8 @@ from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import FieldError, amount
 from antdrive.runs.statistics.comparison import SUCCESS, PairedComparison
 from antdrive.runs.statistics.success import PlannerSuccess
-from antdrive.views.pages.campaign_summary import CampaignSummary, measure_title
-from antdrive.views.pages.rendering import NONE, TextTable, percent, percents, probability, short, with_interval
+from antdrive.views.pages.campaign_summary import CampaignSummary
+from antdrive.views.pages.rendering import NONE, Quantity, TextTable, percent, percents, probability
 
 #: Headings of text columns.
 WORDS = ("planner", "first", "second", "better", "lower", "against", "measure", "not worse")
@@ -24,14 +24,15 @@ LATEX_PAGE = 40  # table rows per page
 
 def success_cells(summary: CampaignSummary) -> TextTable:
     """Return each planner's success rate and its medians over the instances solved by all planners."""
-    names = list(summary.medians)
+    medians = summary.medians.values()
+    quantities = [Quantity.of(name) for name in summary.medians]
     elsewhere = any(row.elsewhere for row in summary.success)
     over = any(not math.isnan(row.over_worlds.low) for row in summary.success)
     headings = (
         *("planner", "share [%]", "95 % interval"),
         *(["over worlds"] if over else []),
         *("succeeded", "counted", "runs", *(["elsewhere"] if elsewhere else [])),
-        *(f"median {measure_title(name)}" for name in names),
+        *(f"median {quantity.heading}" for quantity in quantities),
     )
     rows = []
     for k, row in enumerate(summary.success):
@@ -43,7 +44,10 @@ def success_cells(summary: CampaignSummary) -> TextTable:
                 *([percents(row.across_worlds)] if over else []),
                 *(str(row.successes), str(row.counted), str(row.runs)),
                 *([str(row.elsewhere)] if elsewhere else []),
-                *(with_interval(*summary.medians[name][k]) for name in names),
+                *(
+                    f"{quantity.text(median)} ({quantity.text(low)} to {quantity.text(high)})"
+                    for quantity, (median, (low, high)) in zip(quantities, (rows[k] for rows in medians), strict=True)
+                ),
             )
         )
     smoothings = list(dict.fromkeys(summary.table.texts("smoothing")))
@@ -64,14 +68,12 @@ def pair_cells(measure: str, comparisons: Sequence[PairedComparison]) -> TextTab
         *([] if success else ["dropped"]),
         *(["unpaired"] if unpaired else []),
     )
-    title = "Success of pairs" if success else measure_title(measure)
-    return TextTable(title, headings, [_pair_row(row, success, over, unpaired) for row in comparisons])
+    quantity = Quantity.of(measure)
+    title, shown = ("Success of pairs", percent) if success else (quantity.heading, quantity.text)
+    return TextTable(title, headings, [_pair_row(row, shown, over, unpaired) for row in comparisons])
 
 
-def _pair_row(row: PairedComparison, success: bool, over: bool, unpaired: bool) -> tuple[str, ...]:
-    def shown(value: float) -> str:
-        return percent(value) if success else short(value)
-
+def _pair_row(row: PairedComparison, shown: Callable[[float], str], over: bool, unpaired: bool) -> tuple[str, ...]:
     return (
         row.first,
         row.second,
@@ -82,7 +84,7 @@ def _pair_row(row: PairedComparison, success: bool, over: bool, unpaired: bool) 
         *([probability(row.p_worlds_holm)] if over else []),
         NONE if not row.pairs else f"{row.effect + 0.0:.2f}",
         *(str(row.pairs), str(row.first_wins), str(row.second_wins), str(row.ties)),
-        *([] if success else [str(row.dropped)]),
+        *([] if row.measure == SUCCESS else [str(row.dropped)]),
         *([str(row.unpaired)] if unpaired else []),
     )
 
@@ -139,8 +141,8 @@ def allowance_cells(summary: CampaignSummary) -> TextTable:
     headings = ("planner", "against", "measure", "not worse", "allowed", "advantage", "95 % of all", "worlds", "needed")
     rows: list[tuple[str, ...]] = []
     for row in summary.allowances:
-        shown = percent if row.measure == SUCCESS else short
-        title = "success [%]" if row.measure == SUCCESS else measure_title(row.measure)
+        quantity = Quantity.of(row.measure)
+        title, shown = ("success [%]", percent) if row.measure == SUCCESS else (quantity.heading, quantity.text)
         passed = "yes" if row.not_worse else NONE
         ends = f"{shown(row.interval.low)} to {shown(row.interval.high)}"
         counts = (str(row.worlds), str(row.needed))

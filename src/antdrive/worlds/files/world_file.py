@@ -17,7 +17,7 @@ from pydantic import BaseModel, Field
 
 from antdrive.base.atomic import write_text
 from antdrive.base.caches import cached
-from antdrive.base.checks import OneLine, SchemaVersion, check, file_schema, resolve, suggest, yaml_number
+from antdrive.base.checks import OneLine, SchemaVersion, check, file_schema, resolve, suggest, yaml_flow
 from antdrive.base.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
 from antdrive.base.errors import FieldError, InputError, input_error, visible
 from antdrive.base.files import format_size
@@ -288,24 +288,15 @@ def _to_yaml(data: dict[str, Any]) -> str:
     lines = []
     for key, value in data.items():
         if isinstance(value, list | float):
-            lines.append(f"{key}: {_flow(value)}\n")
+            lines.append(f"{key}: {yaml_flow(value)}\n")
         else:
             lines.append(yaml.safe_dump({key: value}, allow_unicode=True, width=100))
     for key, entries in lists.items():
         lines.append(f"{key}:\n" if entries else f"{key}: []\n")
         # Every JSON string is a YAML string.
         quoted = [{**entry, "name": json.dumps(entry["name"])} if "name" in entry else entry for entry in entries]
-        lines += [f"  - {_flow(entry)}\n" for entry in quoted]
+        lines += [f"  - {yaml_flow(entry)}\n" for entry in quoted]
     return "".join(lines)
-
-
-def _flow(value: Any) -> str:
-    """Format plain data on one line of YAML."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_flow(inner)}" for key, inner in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_flow, value)) + "]"
-    return yaml_number(value) if isinstance(value, float) else str(value)
 
 
 def require_no_movers(task: Task, path: str | Path) -> None:

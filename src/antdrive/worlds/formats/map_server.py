@@ -16,7 +16,7 @@ import json
 import os
 import re
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -26,7 +26,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
 from antdrive.base.atomic import atomic_write, write_text
-from antdrive.base.checks import OneLine, check, yaml_number
+from antdrive.base.checks import OneLine, check, yaml_flow, yaml_number
 from antdrive.base.document import read_document
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.files import open_regular, require_new
@@ -290,7 +290,7 @@ def export_map_server(
     text = (
         f"image: '{name}'\n"
         f"resolution: {yaml_number(cells.resolution)}\n"
-        f"origin: {_yaml_list(world_to_map(task.frame, [(*cells.origin, 0.0)])[0].tolist())}\n"
+        f"origin: {yaml_flow(world_to_map(task.frame, [(*cells.origin, 0.0)])[0].tolist())}\n"
         "negate: 0\n"
         "occupied_thresh: 0.65\n"
         "free_thresh: 0.196\n"
@@ -310,11 +310,7 @@ def export_map_server(
 def _ends(task: Task) -> tuple[str, ...]:
     """Return a task's start, goal and tolerance in its map as YAML entries."""
     return (
-        f"start: {_yaml_list(world_to_map(task.frame, [task.start])[0].tolist())}",
-        f"goal: {_yaml_list(world_to_map(task.frame, [task.goal])[0].tolist())}",
+        f"start: {yaml_flow(world_to_map(task.frame, [task.start])[0].tolist())}",
+        f"goal: {yaml_flow(world_to_map(task.frame, [task.goal])[0].tolist())}",
         f"goal_tolerance: {yaml_number(task.goal_tolerance)}",
     )
-
-
-def _yaml_list(values: Iterable[float]) -> str:
-    return f"[{', '.join(map(yaml_number, values))}]"

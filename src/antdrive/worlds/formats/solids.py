@@ -17,6 +17,7 @@ from antdrive.base.errors import input_error
 from antdrive.base.plane import tidy
 from antdrive.base.types import Floats, Point
 from antdrive.worlds.formats.cellmap import MAX_DISCS, SLACK, cover_inside
+from antdrive.worlds.formats.xml import numbers_in
 from antdrive.worlds.limits import MAX_COORDINATE
 from antdrive.worlds.world import Disc
 
@@ -39,11 +40,8 @@ class Unsupported(Exception):
 
 def numbers(text: str | None, count: int, key: str) -> Floats:
     """Parse so many finite numbers."""
-    try:
-        values = np.array([float(word) for word in (text or "").split()])
-    except ValueError:
-        values = np.empty(0)
-    if len(values) != count or not (np.abs(values) <= MAX_COORDINATE).all():
+    values = numbers_in(text, count)
+    if values is None:
         raise Unsupported(
             f"{key} must be {f'{count} numbers' if count > 1 else 'a number'} of at most {MAX_COORDINATE:g}, "
             f"got {(text or '').strip()[:40]!r}"

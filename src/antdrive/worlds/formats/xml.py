@@ -15,6 +15,7 @@ import numpy as np
 from antdrive.base.errors import input_error
 from antdrive.base.files import read_bytes
 from antdrive.base.types import Floats
+from antdrive.worlds.limits import MAX_COORDINATE
 
 MAX_BYTES = 50_000_000  # BARN's worlds have 0.7 MB
 MAX_DEPTH = 100
@@ -63,6 +64,15 @@ def parse_xml(path: Path, text: str | None = None) -> ET.Element:
             raise input_error(str(path), f"not XML: {error}") from None
         raise
     return builder.close()
+
+
+def numbers_in(text: str | None, count: int, most: float = MAX_COORDINATE) -> Floats | None:
+    """Return so many numbers, none of a larger magnitude than `most` (count,); None for any other text."""
+    try:
+        values = np.array([float(word) for word in (text or "").split()])
+    except ValueError:
+        return None
+    return values if len(values) == count and (np.abs(values) <= most).all() else None
 
 
 def pose_matrix(position: Iterable[float], angles: Iterable[float]) -> Floats:

@@ -6,8 +6,8 @@
   // A column has the text and the sort key of each row; distinct texts are compared once.
   for (const raw of data.columns) {
     if (raw.numbers) {
-      const keys = Float64Array.from(raw.numbers, (v) => (v === null ? NaN : v));
-      columns.set(raw.name, { numeric: true, keys, text: (row) => (raw.numbers[row] === null ? "–" : String(raw.numbers[row])) });
+      const keys = Float64Array.from(raw.numbers, (v) => (v === null ? NaN : raw.factor ? Number((raw.factor * v).toPrecision(6)) : v));
+      columns.set(raw.name, { numeric: true, keys, text: (row) => (raw.numbers[row] === null ? "–" : String(keys[row])) });
       continue;
     }
     const places = raw.places || raw.texts.map((_, k) => k), order = raw.texts.map((_, k) => k).sort((a, b) => collator.compare(raw.texts[a], raw.texts[b]));

@@ -37,7 +37,7 @@ def with_exact_fixes(s: Scenario, key: str) -> str:
 
 def without_odometry(s: Scenario, key: str) -> str:
     """Return a reason for a robot that is localised otherwise."""
-    if s.drifting or (s.localisation == "fixes" and s.map == "none" and s.noisy):
+    if s.drifting or (s.localisation == "fixes" and s.mapless and s.noisy):
         return ""
     return f"localisation {s.localisation} uses no odometry errors here; odometry, matching and noisy fixes without a map do"
 
@@ -50,7 +50,7 @@ def on_other_routes(s: Scenario, key: str) -> str:
     raw = s.driven_smoothing == "none"
     if options[name].acts_on is SMOOTH and raw:
         return f"routes without smoothing have corners; set controller.corner_{name}"
-    if options[name].acts_on is CORNERS and not raw and s.map == "given" and not s.moving:
+    if options[name].acts_on is CORNERS and not raw and not s.mapless and not s.moving:
         return f"smoothing {s.smoothing} leaves no corners; set controller.{name.removeprefix('corner_')}"
     return ""
 
@@ -78,7 +78,7 @@ def without_choice_of_perception(s: Scenario, key: str) -> str:
 
 def without_replans(s: Scenario, key: str) -> str:
     """Return a reason for a drive without movers on a given map."""
-    return without_movers(s, key) if s.map == "given" else ""
+    return without_movers(s, key) if not s.mapless else ""
 
 
 def without_chance(s: Scenario, key: str) -> str:

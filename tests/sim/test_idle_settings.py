@@ -11,13 +11,13 @@ from antdrive.planners import load_planner
 from antdrive.robots import Noise, PurePursuit
 from antdrive.robots.control.pursuit import controller_options
 from antdrive.sim import Perception, ReplanPolicy, run
-from antdrive.sim.effects import idle_notes
+from antdrive.sim.idle_settings import idle_notes
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.settings import SETTINGS
 from antdrive.worlds import Cruising, Disc, Wandering
 from tests.records import COARSE
 
-pytestmark = pytest.mark.xdist_group("effects")
+pytestmark = pytest.mark.xdist_group("idle settings")
 
 #: Factors on options of the controller that act only where they are large.
 FACTORS = {"lookahead_time": 6.0, "corner_lookahead_time": 4.0, "rotate_in_place_until": 0.3, "goal_distance": 2.0}
