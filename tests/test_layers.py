@@ -87,7 +87,6 @@ BODY = {
     "mover_sense",
     "odometry",
     "plants",
-    "replay",
     "routes",
     "senses",
     "simulated_lidar",

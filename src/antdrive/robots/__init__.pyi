@@ -3,6 +3,8 @@ from .clearance import outline_of as outline_of
 from .clearance import overlap_at as overlap_at
 from .control.avoidance import Avoidance as Avoidance
 from .control.avoidance import AvoidanceState as AvoidanceState
+from .control.observation import Briefing as Briefing
+from .control.observation import Observation as Observation
 from .control.pursuit import LIMITERS as LIMITERS
 from .control.pursuit import PurePursuit as PurePursuit
 from .control.pursuit import PursuitState as PursuitState

@@ -9,17 +9,19 @@ import dataclasses
 import math
 from typing import NamedTuple
 
-from antdrive.robots import LIMITERS, Avoidance
+from antdrive.base.records import unchecked_copy
+from antdrive.robots import Avoidance
+from antdrive.robots.control.observation import Briefing
 from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
-from antdrive.sim.driving.driver import full_turn
+from antdrive.sim.driving.driver import Driver, full_turn
 from antdrive.sim.driving.exploring import Exploration, TurnToScan
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.mover_sense import MoverSense
 from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import EXPLORING_LIMITERS, Logs, RouteGuide, Rule
+from antdrive.sim.driving.parts import RouteGuide, Rule
 from antdrive.sim.driving.perceived_movers import Given, PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.route_planner import RoutePlanner
@@ -28,7 +30,7 @@ from antdrive.sim.driving.rules import GOAL_SHARE, Avoid, KeepToSchedule, Pursui
 from antdrive.sim.driving.senses import Senses, positioning
 from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import MoverDetector, Scans, Survey, turning_room
+from antdrive.sim.driving.survey import MoverDetector, Survey, turning_room
 from antdrive.sim.policy import Perception
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
@@ -40,33 +42,44 @@ BLIND_SHARE = (
 )
 
 
-class Parts(NamedTuple):
-    """Parts of a drive, and their entries in its record; None: unused."""
+class Sensors(NamedTuple):
+    """Sensors of a robot; None: unused."""
 
     senses: Senses
     localiser: Exact
     lidar: SimulatedLidar | None
     movers: MoverSense | None
-    scans: Scans | None
-    given: Given
-    guide: RouteGuide
-    rules: tuple[Rule, ...]  # in order of application
-    logs: tuple[Logs, ...]
-    limiters: tuple[str, ...]  # names of the rules that limit the speed
 
 
-def compose(s: Scenario) -> Parts:
-    """Select the parts of a scenario's drive."""
-    perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
-    tracks_movers, mapless = perception.kind == "lidar", s.mapless
-    moving = s.moving
+def compose(s: Scenario) -> tuple[Sensors, RouteGuide, Driver]:
+    """Create the sensors of a scenario's drive, and the guide and the mind, which know the briefing and observations."""
+    perception, trajectories, hz, start = perception_of(s), s.trajectories, s.control_hz, s.task.start
+    tracks_movers = perception.kind == "lidar"
     levels = s.localisation, s.robot, s.noise, s.odometry, 1 / hz
-    senses, localiser = positioning(*levels, s.task.start, s.seed, mapless=mapless)
-    lidar = _simulated_lidar(s) if mapless or tracks_movers else None
-    survey = _survey(s, lidar, tracks_movers, matching=localiser.matched) if lidar and mapless else None
+    senses, localiser = positioning(*levels, start, s.seed, mapless=s.mapless)
+    lidar = None
+    if s.mapless or tracks_movers:
+        lidar = SimulatedLidar.of(_lidar(s), s.driven_world, trajectories, seed=s.seed, noisy=s.noise > 0, hz=hz)
+    briefing = Briefing(
+        s.robot, start, s.task.goal, s.task.goal_tolerance, hz,
+        map=None if s.mapless else unchecked_copy(s.task.world, movers=()),
+        sight=lidar.first(start, turning_room(s.robot.radius)) if lidar and s.mapless else None,
+        matching=localiser.matched,
+        movers=len(trajectories),
+        motions=trajectories.positions if perception.kind == "motions" else None,
+    )  # fmt: skip
+    movers = MoverSense(trajectories, perception, hz) if s.moving and not tracks_movers else None
+    return Sensors(senses, localiser, lidar, movers), *_mind(s, briefing)
+
+
+def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
+    """Create the guide and the mind of a robot from a scenario's settings."""
+    perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
+    tracks_movers, mapless, moving = perception.kind == "lidar", s.mapless, s.moving
+    survey = _survey(s, briefing, tracks_movers) if mapless else None
     scans = _mover_detector(s) if not mapless and tracks_movers else survey
     tracking = scans.tracking if scans else None
-    given = _given(s)
+    given = Given(perception, hz, briefing.movers, briefing.motions)
     movers: PerceivedMovers = Tracked(tracking, perception, hz) if tracking else given
     # A scan may be one scan period old, and commands are delayed.
     reaction = 1 / hz + (1 / _lidar(s).rate if scans else 0.0) + s.robot.noise.scaled(s.noise).delay
@@ -96,18 +109,7 @@ def compose(s: Scenario) -> Parts:
         )  # fmt: skip
     if survey:
         rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_command))
-    return Parts(
-        senses,
-        localiser,
-        lidar,
-        MoverSense(s.trajectories, perception, hz) if moving and not tracking else None,
-        scans,
-        given,
-        guide,
-        tuple(rules),
-        tuple(part for part in (guide, tracking) if part is not None),
-        limiters=EXPLORING_LIMITERS if survey else LIMITERS,
-    )
+    return guide, Driver(briefing, guide, rules, scans, given)
 
 
 def perception_of(s: Scenario) -> Perception:
@@ -176,12 +178,11 @@ def _exploration(s: Scenario, survey: Survey) -> Exploration:
     return Exploration(route_planner(s), survey, policy, ahead)
 
 
-def _survey(s: Scenario, lidar: SimulatedLidar, tracks_movers: bool, *, matching: bool) -> Survey:
+def _survey(s: Scenario, known: Briefing, tracks_movers: bool) -> Survey:
     """Create the mapping of a mapless robot."""
     tracking = MoverTracking(_lidar(s), s.control_hz) if tracks_movers else None
-    matching = matching and (tracks_movers or not s.task.world.movers)  # movers without tracks would shift the match
-    sight = lidar.first(s.task.start, turning_room(s.robot.radius))
-    return Survey(s.robot, s.task.start, s.task.goal, s.control_hz, sight, matching=matching, tracking=tracking)
+    matching = known.matching and (tracks_movers or not known.movers)  # those without tracks would shift the match
+    return Survey(known.robot, known.start, known.goal, known.hz, known.sight, matching=matching, tracking=tracking)
 
 
 def _mover_detector(s: Scenario) -> MoverDetector:
@@ -192,18 +193,6 @@ def _mover_detector(s: Scenario) -> MoverDetector:
     return MoverDetector(ground, MoverTracking(lidar, s.control_hz, *errors))
 
 
-def _given(s: Scenario) -> Given:
-    """Create the robot's knowledge of movers that it is given."""
-    perception, trajectories = perception_of(s), s.trajectories
-    motions = trajectories.positions if perception.kind == "motions" else None
-    return Given(perception, s.control_hz, len(trajectories), motions)
-
-
 def _lidar(s: Scenario) -> Lidar:
     assert s.robot.lidar is not None  # `Scenario` checks that the robot has a lidar
     return s.robot.lidar
-
-
-def _simulated_lidar(s: Scenario) -> SimulatedLidar:
-    """Simulate the lidar in the driven world."""
-    return SimulatedLidar.of(_lidar(s), s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)

@@ -2,30 +2,42 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.progress import progress_bar
-from antdrive.base.version import require_physics
+from antdrive.base.version import require_physics, versions
 from antdrive.planners import PlanResult, PlanStatus
+from antdrive.robots import Observation, TrackedPath, Twist
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import Progress, drive, ignore_progress
-from antdrive.sim.driving.driver import Driver
-from antdrive.sim.driving.plants import Bullet
+from antdrive.sim.driving.parts import SILENT, Ending, Note
+from antdrive.sim.driving.plants import Bullet, Drive
 from antdrive.sim.facts import LoggedRun, result_of
 from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.log.contacts import attributed
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import ComponentRecord, DriveRecord, SmoothingRecord, TimesRecord, settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
-from antdrive.sim.recording import rollout_of
+from antdrive.sim.recording import configuration_of, plan_record
 from antdrive.sim.scenario import Scenario, picture_of, usual_time_limit
+from antdrive.sim.written import Written
 from antdrive.worlds import Grid
 from antdrive.worlds.svg import card
+
+if TYPE_CHECKING:
+    from types import TracebackType
 
 ENDED_BY = {
     PlanStatus.NO_PATH: Outcome.NO_PATH,
@@ -124,6 +136,151 @@ class Run:
         return card(picture_of(s), f"{s.task.world.name}: {self.outcome.value}", facts)
 
 
+class Session:
+    """Drive of a scenario that is observed and commanded from outside, for use in a `with` block.
+
+    It plans first, as `run` does, and opens physics if there is a path. One that is left early logs the outcome `STOPPED`.
+
+    >>> with Session(scenario) as drive:
+    ...     while not drive.ended:
+    ...         drive.step(*drive.mind.act(drive.observe()))
+    >>> drive.run.certificate
+
+    Attributes:
+        mind: the scenario's own mind: `step(*mind.act(observe()))` drives as `run` does
+        briefing: what the robot knows before the drive
+        grid: the planning grid
+        plan: the planner's answer
+        path: the planned path; None if planning found none
+        rollout: the log, once the `with` block is left; None without a path
+
+    Args:
+        s: the scenario
+        planned: as in `run`
+
+    Raises:
+        PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
+    """
+
+    def __init__(self, s: Scenario, planned: tuple[Grid, PlanResult] | None = None) -> None:
+        require_physics()
+        self._scenario, (self._sensors, guide, self.mind) = s, compose(s)
+        self.briefing = self.mind.briefing
+        self.grid, self.plan = guide.first() if planned is None else guide.accept(*planned)
+        self.path: TrackedPath | None = None
+        self._open = contextlib.ExitStack()
+        self._body: Body | None = None
+        self.rollout: Rollout | None = None
+        self._by_itself = True  # whether its mind has given every command
+        if self.plan.solved:
+            self._route, self.path = guide.route(self.grid, self.plan)
+            self.mind.path = self.path
+
+    def __enter__(self) -> Session:
+        s = self._scenario
+        self._started = time.perf_counter()
+        if self.path is not None:
+            self._limit = s.time_limit or s.task.time_limit or usual_time_limit(self._route.length, s.robot, s.noise)
+            physics = Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories)
+            self._plant = Bullet(self._open.enter_context(physics), s.task.start, s.control_hz)
+            self._body = Body(self._plant, *self._sensors, hz=s.control_hz, limit=self._limit, task=s.task)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        with self._open:
+            if self._body is not None:
+                left = Ending(Outcome.STOPPED, "left by the loop that commanded it" if error is None else repr(error))
+                ending = self.mind.with_reason(self._body.ended or left, self._body.tick)
+                self.rollout = self._logged(self._body, self._plant.finish(ending))
+
+    @property
+    def ended(self) -> Ending | None:
+        """How the drive ended; None while it goes on."""
+        return self._body.ended if self._body is not None else Ending(ENDED_BY[self.plan.status], self.plan.reason)
+
+    @property
+    def run(self) -> Run:
+        """The result, with its log and certificate, once the `with` block is left."""
+        log = self.rollout
+        return Run(self._scenario, self.grid, self.plan, log, None if log is None else certify(log))
+
+    def observe(self) -> Observation:
+        """Return what the robot observes in this control period.
+
+        Raises:
+            FieldError: there is no drive.
+        """
+        return self._driving("observe").observe()
+
+    def step(self, command: Twist | None, note: Note = SILENT) -> None:
+        """Drive for one control period; without a command, or at the goal, the drive ends where the robot stands.
+
+        Args:
+            command: speed [m/s] and yaw rate [rad/s]
+            note: what a mind tells of its command
+
+        Raises:
+            FieldError: the command is not two finite numbers, or there is no drive.
+        """
+        if note is SILENT:
+            self._by_itself, command = False, command if command is None else Twist(*_finite(command))
+        self._driving("step").step(command, note)
+
+    def _driving(self, call: str) -> Body:
+        if self._body is None:
+            raise FieldError(call, f"there is no path: {self.plan.reason}" if self.path is None else "use `with`")
+        if self._body.ended is not None or self.rollout is not None:
+            raise FieldError(call, "the drive has ended")
+        return self._body
+
+    def _logged(self, body: Body, log: Drive) -> Rollout:
+        """Assemble the log."""
+        s, mind, per_tick = self._scenario, self.mind, self._plant.per_tick
+        guide, facts = mind.guide, configuration_of(s, self.grid, self.plan)
+        if not self._by_itself:
+            facts["controller"] = ComponentRecord(name=Session.__name__, settings={})
+        drive_wall_s = time.perf_counter() - self._started
+        record = DriveRecord(
+            **facts,
+            plan=plan_record(s, guide.footprint_margin, self.grid, self.plan),
+            smoothing=SmoothingRecord(asked=s.smoothing, made=self._route.kind, note=self._route.note),
+            replans=tuple(guide.log),
+            limiters=mind.limiters,
+            margin_choice=s.chosen.record if s.chosen is not None else None,
+            inflate=s.inflate,
+            time_limit=self._limit,
+            footprint_margin=guide.footprint_margin,
+            outcome=log.outcome,
+            reason=log.reason,
+            physics=log.physics,
+            written=settings_of(Written.of(s).plain()),
+            versions=versions(),
+            times=TimesRecord(plan_s=self.plan.wall_s, drive_wall_s=drive_wall_s, replans_s=tuple(guide.walls)),
+        )
+        rows = {
+            name: array for name, array in vars(log).items() if isinstance(array, np.ndarray) and name != "actuated"
+        }
+        rows |= {"route": self._route.xy, "cells": self.plan.cells}
+        return attributed(Rollout(**rows | body.logged(log, per_tick) | mind.logged(log, per_tick), record=record))
+
+
+def _finite(command: Sequence[float]) -> tuple[float, float]:
+    """Return a command's two numbers.
+
+    Raises:
+        FieldError: it has no two finite numbers.
+    """
+    try:
+        speed, yaw_rate = map(float, command)
+    except (TypeError, ValueError):
+        speed = yaw_rate = math.nan
+    if not (math.isfinite(speed) and math.isfinite(yaw_rate)):
+        raise FieldError("command", f"must be two finite numbers, a speed and a yaw rate, got {command!r:.60}")
+    return speed, yaw_rate
+
+
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
     """Plan a scenario's first route; return the grid and the planner's checked answer.
 
@@ -134,7 +291,7 @@ def plan(s: Scenario) -> tuple[Grid, PlanResult]:
     Raises:
         PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
     """
-    return compose(s).guide.first()
+    return compose(s)[1].first()
 
 
 def run(
@@ -163,20 +320,7 @@ def driven(
     s: Scenario, planned: tuple[Grid, PlanResult] | None = None, progress: Progress = ignore_progress
 ) -> tuple[Grid, PlanResult, Rollout | None]:
     """Plan and drive as `run` does; return the grid, the plan, and the log if there is a path."""
-    require_physics()
-    parts = compose(s)
-    grid, answer = parts.guide.first() if planned is None else parts.guide.accept(*planned)
-    if not answer.solved:
-        return grid, answer, None
-    route, path = parts.guide.route(grid, answer)
-    limit = s.time_limit or s.task.time_limit or usual_time_limit(route.length, s.robot, s.noise)
-    started = time.perf_counter()
-    driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz, parts.scans, parts.given)
-    with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories) as engine:
-        plant = Bullet(engine, s.task.start, s.control_hz)
-        body = Body(
-            plant, parts.senses, parts.localiser, parts.lidar, parts.movers, hz=s.control_hz, limit=limit, task=s.task
-        )
-        log = plant.finish(drive(body, driver, progress))
-    parts = parts._replace(logs=(body, *parts.logs))
-    return grid, answer, rollout_of(s, parts, grid, answer, route, log, limit, time.perf_counter() - started)
+    with Session(s, planned) as session:
+        if session._body is not None:
+            drive(session._body, session.mind, progress)
+    return session.grid, session.plan, session.rollout

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from antdrive.base import FieldError
 from antdrive.planners import Query, load_planner, smooth
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, Noise, PurePursuit, PursuitState, Twist, load_robot
+from antdrive.robots.control.observation import Briefing, Observation
 from antdrive.robots.noise import moved_by
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
@@ -24,8 +25,7 @@ from antdrive.sim.driving.drive import drive, follow
 from antdrive.sim.driving.driver import Driver, OnePath, full_turn
 from antdrive.sim.driving.exploring import TurnToScan
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.observation import SILENT, Note, Observation
-from antdrive.sim.driving.parts import SIGHT_LIMIT, Ending, Guide, Moment, Step, StuckClock
+from antdrive.sim.driving.parts import SIGHT_LIMIT, SILENT, Ending, Guide, Moment, Note, Step, StuckClock
 from antdrive.sim.driving.plants import Bullet, Kinematic
 from antdrive.sim.driving.rules import (
     AVOIDING,
@@ -61,12 +61,15 @@ def driver(robot, guide=None, *rules):
     controller = PurePursuit()
     tracked = controller.prepare(smooth(plan, grid, TASK), HALL, robot, 0.03, 1 / 60)
     pursuit = Pursuit(controller, full_turn(robot, 60))
-    return Driver(guide or OnePath(), (pursuit, *rules), tracked, TASK, robot, 60)
+    known = Briefing(robot, TASK.start, TASK.goal, TASK.goal_tolerance, 60, HALL)
+    made = Driver(known, guide or OnePath(), (pursuit, *rules))
+    made.path = tracked
+    return made
 
 
 def seen(tick=0, pose=TASK.start, speed=0.0):
     """What a robot without errors observes."""
-    return Observation(tick, pose, (), Twist(speed, 0.0))
+    return Observation(tick, tick / 60, pose, (), Twist(speed, 0.0))
 
 
 class Off(Senses):
@@ -245,7 +248,7 @@ def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, tu
 
         noted = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
         monkeypatch.setattr("antdrive.sim.compose.avoidance_of", lambda _, noted=noted: noted)
-        rule = next(rule for rule in compose(unknown).rules if type(rule) is Avoid)
+        rule = next(rule for rule in compose(unknown)[2].rules if type(rule) is Avoid)
         rule.apply(Moment(0, TASK.start, driver(robot).path, Step(), StuckClock()), Step())
         slow = robot is jackal and perception.kind == "lidar"
         assert asked == [BLIND_SHARE * robot.max_speed if slow else math.inf]

@@ -118,7 +118,7 @@ def test_a_robot_that_left_its_cell_returns_around_obstacles(turtlebot):
     """Avoiding movers has taken the robot to the other side of the wall; its own cell lies behind a post."""
     task = changed(TASK, "world", movers=(GATEKEEPER,))
     scenario = Scenario.of(task, "mmas-dstar", turtlebot, **COARSE)
-    monitor = compose(scenario).guide
+    monitor = compose(scenario)[1]
     assert isinstance(monitor, CellByCell)
     grid, answer = monitor.first()
     monitor.route(grid, answer)
@@ -194,8 +194,8 @@ def monitor_of(*movers, robot, planner="dstar-lite", **settings):
     policy = ReplanPolicy(**settings)
     s = Scenario.of(task, planner, robot, avoidance=None, replanning=policy)
     truth = GroundTruth(s.trajectories, s.known_perception, s.control_hz)
-    with mock.patch("antdrive.sim.compose._given", return_value=truth):
-        made = compose(s).guide
+    with mock.patch("antdrive.sim.compose.Given", return_value=truth):
+        made = compose(s)[1]
     return made, made.route(*made.first())[1]
 
 
@@ -287,10 +287,10 @@ def test_a_plan_in_time_has_a_schedule_among_movers_alone_with_or_without_replan
     moving = changed(TASK, "world", movers=(GATEKEEPER,))
     for task, scheduled in ((moving, True), (TASK, False)):
         for settings in ({"replanning": None}, {}, {"perception": Perception(kind="lidar")}):
-            parts = compose(Scenario.of(task, "sipp", jackal, margin=0.1, **settings))
-            parts.guide.route(*parts.guide.first())
-            assert (parts.guide.schedule is not None) is scheduled
-            assert any(isinstance(rule, KeepToSchedule) for rule in parts.rules) is scheduled
+            _, guide, mind = compose(Scenario.of(task, "sipp", jackal, margin=0.1, **settings))
+            guide.route(*guide.first())
+            assert (guide.schedule is not None) is scheduled
+            assert any(isinstance(rule, KeepToSchedule) for rule in mind.rules) is scheduled
 
 
 @given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))

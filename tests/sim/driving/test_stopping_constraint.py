@@ -10,7 +10,7 @@ import pytest
 from hypothesis import strategies as st
 
 from antdrive.robots import Footprint, Lidar, PursuitState, Twist, footprint_clearance, load_robot
-from antdrive.sim.driving.observation import FirstSight
+from antdrive.robots.control.observation import FirstSight
 from antdrive.sim.driving.parts import SIGHT_LIMIT, Step
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import Survey

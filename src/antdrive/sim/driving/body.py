@@ -9,10 +9,10 @@ import numpy as np
 
 from antdrive.base import Pose
 from antdrive.robots import Twist
+from antdrive.robots.control.observation import NOBODY, Observation
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.mover_sense import MoverSense
-from antdrive.sim.driving.observation import NOBODY, SILENT, Note, Observation
-from antdrive.sim.driving.parts import Ending, Rows
+from antdrive.sim.driving.parts import SILENT, Ending, Note, Rows
 from antdrive.sim.driving.senses import Senses
 from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.log.ending import arrived, control_periods, outcome_at
@@ -58,7 +58,7 @@ class Body:
         task: Task | None = None,  # where the drive ends; None: nowhere
     ) -> None:
         self._plant, self._senses, self._localiser, self._lidar, self._task = plant, senses, localiser, lidar, task
-        self._movers, self._periods = movers, control_periods(limit, hz)
+        self._movers, self._periods, self._hz = movers, control_periods(limit, hz), hz
         self.estimates: list[Pose] = []
         self._command = Twist(0.0, 0.0)  # in force
         self._now: Observation | None = None
@@ -73,7 +73,7 @@ class Body:
             scan = self._lidar.scan(self.tick, state.pose) if self._lidar else None
             twist, pending = Twist(state.speed, state.yaw_rate), tuple(self._senses.pending)
             movers = self._movers.read(self.tick, pose[:2]) if self._movers else NOBODY
-            self._now = Observation(self.tick, pose, pending, twist, scan, movers)
+            self._now = Observation(self.tick, self.tick / self._hz, pose, pending, twist, scan, movers)
         return self._now
 
     def step(self, command: Twist | None, note: Note = SILENT) -> None:

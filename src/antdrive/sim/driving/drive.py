@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from antdrive.robots import PurePursuit, TrackedPath
+from antdrive.robots.control.observation import Briefing
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.driver import Driver, OnePath, full_turn
 from antdrive.sim.driving.localising import Exact
@@ -52,7 +53,9 @@ def follow(
     """Drive along a path from the start of a task, for at most `limit` [s]; `rules` apply after pursuit."""
     pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))
     sense, given = movers or (None, None)
-    driver = Driver(OnePath(), (pursuit, *rules), path, task, engine.robot, control_hz, given=given)
+    known = Briefing(engine.robot, task.start, task.goal, task.goal_tolerance, control_hz, task.world)
+    driver = Driver(known, OnePath(), (pursuit, *rules), given=given)
+    driver.path = path
     plant = Bullet(engine, task.start, control_hz)
     localiser = localiser or Exact(task.start, 1 / control_hz)
     body = Body(plant, senses or Senses(), localiser, movers=sense, hz=control_hz, limit=limit, task=task)

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 from antdrive.base import Pose
-from antdrive.robots import PursuitState, RobotSpec, TrackedPath, Twist
+from antdrive.robots import LIMITERS, PursuitState, RobotSpec, TrackedPath, Twist
+from antdrive.robots.control.observation import Briefing, Observation
 from antdrive.robots.noise import moved_by
-from antdrive.sim.driving.observation import Note, Observation
-from antdrive.sim.driving.parts import Ending, Guide, Moment, Rule, Step, StuckClock
+from antdrive.sim.driving.parts import (
+    EXPLORING_LIMITERS,
+    Ending,
+    Guide,
+    Moment,
+    Note,
+    Rows,
+    Rule,
+    Step,
+    StuckClock,
+)
 from antdrive.sim.driving.perceived_movers import Given
 from antdrive.sim.driving.rules import WAITING_SPEED
 from antdrive.sim.driving.survey import Scans
 from antdrive.sim.log.ending import STUCK_TIME, arrived, stopped
 from antdrive.sim.log.outcome import Outcome
-from antdrive.worlds import Task
 
 PROGRESS_HZ = 10  # reports of progress per simulated second
 
@@ -24,28 +34,30 @@ class Driver:
     """Mind that drives a robot along a path, one step per control period.
 
     Attributes:
+        briefing: what the robot knows before the drive
+        guide: provides the path
+        rules: compute the command, in order
+        scans: reads the lidar; None: unused
         path: the current path
         step: the current step
         progress_periods: control periods between two reports of progress
     """
 
+    path: TrackedPath
+
     def __init__(
         self,
+        briefing: Briefing,
         guide: Guide,
         rules: Sequence[Rule],
-        path: TrackedPath,
-        task: Task,
-        robot: RobotSpec,
-        hz: int,
         scans: Scans | None = None,
         given: Given | None = None,
     ) -> None:
-        self.path, self.step = path, Step()
-        self._guide, self._rules, self._task, self._hz = guide, tuple(rules), task, hz
-        self._scans, self._given, self._clock = scans, given, StuckClock()
-        self._patience = round(STUCK_TIME * hz)
-        self._full_turn = full_turn(robot, hz)
-        self.progress_periods = hz // PROGRESS_HZ or 1
+        self.briefing, self.guide, self.rules, self.scans, self.step = briefing, guide, tuple(rules), scans, Step()
+        self._given, self._clock, self._hz = given, StuckClock(), briefing.hz
+        self._patience = round(STUCK_TIME * briefing.hz)
+        self._full_turn = full_turn(briefing.robot, briefing.hz)
+        self.progress_periods = briefing.hz // PROGRESS_HZ or 1
 
     @property
     def fraction(self) -> float:
@@ -54,13 +66,13 @@ class Driver:
 
     def act(self, now: Observation) -> tuple[Twist | None, Note]:
         """Return the command of one control period, None to stay where the robot stands, and a note on it."""
-        guide, task, before, believed = self._guide, self._task, self.step, now.pose
-        if now.scan is not None and self._scans is not None:
-            believed = self._scans.read(now.tick, believed, now.scan)
+        guide, known, before, believed = self.guide, self.briefing, self.step, now.pose
+        if now.scan is not None and self.scans is not None:
+            believed = self.scans.read(now.tick, believed, now.scan)
         if self._given is not None:
             self._given.read(now.movers)
         silent = Note(believed)
-        if now.tick and arrived(believed, now.twist, before.command, task.goal, task.goal_tolerance):
+        if now.tick and arrived(believed, now.twist, before.command, known.goal, known.tolerance):
             return None, silent
         pose = moved_by(believed, now.pending, 1 / self._hz)
         waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
@@ -73,7 +85,7 @@ class Driver:
             return None, silent._replace(ending=Ending(Outcome.BLOCKED, guide.blocked))
         self.path = guide.refreshed(self.path, pose)
         moment, step = Moment(now.tick, pose, self.path, self.step, self._clock), self.step
-        for rule in self._rules:
+        for rule in self.rules:
             step = rule.apply(moment, step)
         self.step = step
         if self._at_end_of_route(pose, now.twist, before.command) and not (
@@ -82,6 +94,16 @@ class Driver:
             return None, silent._replace(ending=self._invalid_plan(now.tick) if guide.plan_error else None)
         self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scan_turning)
         return step.command, Note(believed, step.pursuit.limiter, self._gives_up())
+
+    @property
+    def limiters(self) -> tuple[str, ...]:
+        """Names of the rules that limit the speed."""
+        return EXPLORING_LIMITERS if self.briefing.map is None else LIMITERS
+
+    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+        """Return what guide and mover tracking add to a log."""
+        tracking = self.scans.tracking if self.scans else None
+        return self.guide.logged(log, per_tick) | (tracking.logged(log, per_tick) if tracking else {})
 
     def _gives_up(self) -> Ending | None:
         """End the drive of a robot without progress. Turning on the spot adds the time of a full turn to the limit."""
@@ -94,7 +116,7 @@ class Driver:
         """Add the guide's failure note to the reason of a robot that got stuck or timed out."""
         if ending.outcome not in (Outcome.STUCK, Outcome.TIMED_OUT):
             return ending
-        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self._guide.failure_note(tick)))))
+        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self.guide.failure_note(tick)))))
 
     def _follow(self, path: TrackedPath | None) -> bool:
         """Switch to a new path, and return whether there is one."""
@@ -107,14 +129,14 @@ class Driver:
 
     def _at_end_of_route(self, pose: Pose, twist: Twist, last: Twist) -> bool:
         """Return whether the robot stands at the end of its route, and not at the goal, where it arrives in the next period."""
-        path, (command, pursuit, *_), task = self.path, self.step, self._task
+        path, (command, pursuit, *_), known = self.path, self.step, self.briefing
         if path.length - pursuit.arc > path.goal_distance or any(command) or not stopped(twist, last):
             return False
-        return math.dist(pose[:2], task.goal) > task.goal_tolerance
+        return math.dist(pose[:2], known.goal) > known.tolerance
 
     def _invalid_plan(self, tick: int) -> Ending:
         """Return the ending after an invalid plan."""
-        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.plan_error}")
+        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self.guide.plan_error}")
 
 
 def full_turn(robot: RobotSpec, hz: int) -> int:

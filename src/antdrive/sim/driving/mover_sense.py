@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from antdrive.base import Floats, Point
-from antdrive.sim.driving.observation import Movers
+from antdrive.robots.control.observation import Movers
 from antdrive.sim.policy import Perception
 from antdrive.worlds import Trajectories
 

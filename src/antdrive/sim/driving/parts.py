@@ -36,6 +36,17 @@ class Ending(NamedTuple):
     reason: str = ""  # details beyond the outcome's sentence; may be empty
 
 
+class Note(NamedTuple):
+    """What a robot tells of a command."""
+
+    pose: Pose | None = None  # the pose in which it believes, such as one corrected by a scan; None: as observed
+    limiter: int = 0  # the rule that limited the speed, an index into the record's `limiters`
+    ending: Ending | None = None  # why it gives up: at once without a command, else after the control period
+
+
+SILENT = Note()
+
+
 class Step(NamedTuple):
     """Command and controller state of one control period."""
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Point
-from antdrive.sim.driving.observation import NOBODY, Movers
+from antdrive.robots.control.observation import NOBODY, Movers
 from antdrive.sim.policy import Perception
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from antdrive.base import Floats, Point, Pose
+from antdrive.robots.control.observation import FirstSight
 from antdrive.robots.lidar import Lidar
-from antdrive.sim.driving.observation import FirstSight
 from antdrive.sim.driving.parts import Rows
 from antdrive.sim.log.rollout import scans_logged
 from antdrive.sim.log.streams import random_stream

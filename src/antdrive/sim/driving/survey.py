@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from antdrive.base import Floats, Point, Pose
 from antdrive.robots import RobotSpec, Twist
+from antdrive.robots.control.observation import FirstSight
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.mover_tracking import MAP_CELL, MoverTracking
-from antdrive.sim.driving.observation import FirstSight
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.policy import Trigger
 from antdrive.sim.sensing.mapping import OccupancyMap, clear_way, shape_of
@@ -88,10 +88,12 @@ class Scans:
 
     Attributes:
         scans: all scans so far
+        tracking: the mover tracker; None without tracking
     """
 
-    def __init__(self) -> None:
+    def __init__(self, tracking: MoverTracking | None = None) -> None:
         self.scans: list[Scan] = []
+        self.tracking = tracking
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
         """Store a scan; return the estimate, possibly corrected by the scan."""
@@ -100,19 +102,15 @@ class Scans:
 
 
 class MoverDetector(Scans):
-    """Lidar-based mover detection for a robot with a map.
-
-    Attributes:
-        tracking: the tracks of the movers
-    """
+    """Lidar-based mover detection for a robot with a map."""
 
     def __init__(self, ground: Ground, tracking: MoverTracking) -> None:
-        super().__init__()
-        self.tracking, self._ground = tracking, ground
+        super().__init__(tracking)
+        self._tracks, self._ground = tracking, ground
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
         """Store a scan and track movers in it; return the estimate."""
-        self.tracking.read(self._ground, estimate, ranges, tick)
+        self._tracks.read(self._ground, estimate, ranges, tick)
         return super().read(tick, estimate, ranges)
 
 
@@ -125,7 +123,6 @@ class Survey(Scans):
         lidar: the lidar
         map: the occupancy map
         whole: number of scans entered as a whole, with their free ground
-        tracking: the mover tracker; None without tracking
 
     Args:
         robot: the robot; it has a lidar
@@ -148,14 +145,13 @@ class Survey(Scans):
         matching: bool = False,
         tracking: MoverTracking | None = None,
     ) -> None:
-        super().__init__()
+        super().__init__(tracking)
         assert robot.lidar is not None
         self.lidar = robot.lidar.at(hz)
         foot = robot.footprint
         self._shape = shape_of(dataclasses.replace(foot, rounding=foot.rounding + PAD))
         self._turning_room = turning_room(robot.radius)
         self._goal = goal
-        self.tracking = tracking
         moving = tracking is not None
         horizon = horizon_of(tracks_movers=moving)
         self.map = OccupancyMap(self.lidar, MAP_CELL, start[:2], horizon, goal=goal, moving=moving)
