@@ -31,7 +31,7 @@ from antdrive.robots import Avoidance, PurePursuit, TrackedPath, load_robot
 from antdrive.sim import Perception, Scenario, run
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import follow
-from antdrive.sim.driving.driver import Driver, OnePath
+from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.mover_sense import MoverSense
 from antdrive.sim.driving.perceived_movers import Given
@@ -102,7 +102,7 @@ def table_of_movers(route: Route, rounds: int) -> None:
                 (f"{MOVERS} movers, avoided", full, moving),
             ):
                 told, sense = Given(Perception(), 60, len(motions)), MoverSense(motions, Perception(), 60)
-                avoid = Avoid(Avoidance(), told, OnePath(), task, robot, 60)
+                avoid = Avoid(Avoidance(), told, task, robot, 60)
                 started = time.process_time()
                 rules = [avoid] if name.endswith("avoided") else []
                 log = follow(

@@ -15,18 +15,18 @@ from antdrive.robots.control.observation import Briefing
 from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.driver import Driver, full_turn
-from antdrive.sim.driving.exploring import Exploration, TurnToScan
+from antdrive.sim.driving.exploring import Exploration
+from antdrive.sim.driving.guide import RouteGuide, Rule
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.mover_sense import MoverSense
 from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import RouteGuide, Rule
 from antdrive.sim.driving.perceived_movers import Given, PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.route_planner import RoutePlanner
 from antdrive.sim.driving.routes import OneRoute
-from antdrive.sim.driving.rules import GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, SlowAtCorners
+from antdrive.sim.driving.rules import GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, SlowAtCorners, TurnToScan
 from antdrive.sim.driving.senses import Senses, positioning
 from antdrive.sim.driving.simulated_lidar import SimulatedLidar
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
@@ -87,11 +87,11 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
     guide: RouteGuide
     if survey:
         guide = exploration = _exploration(s, survey)
-        rules.append(TurnToScan(exploration, s.robot, hz))
+        rules.append(TurnToScan(s.robot, hz))
     else:
         guide = _guide(s, movers, moving)
     if s.timed:
-        rules.append(KeepToSchedule(guide, s.robot, hz))
+        rules.append(KeepToSchedule(s.robot, hz))
     if moving and avoidance is not None:
         if not mapless and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
             rules.append(SlowAtCorners(tracking, s.robot, hz, reaction))
@@ -103,7 +103,7 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
         delay, losses = s.robot.noise.scaled(s.noise).delay, clearances_off_route(s.robot, s.controller, s.noise)
         rules.append(
             Avoid(
-                avoidance, movers, guide, s.task, s.robot, hz, goal_share=share, backwards=backwards, delay=delay,
+                avoidance, movers, s.task, s.robot, hz, goal_share=share, backwards=backwards, delay=delay,
                 losses=losses, habits=habits,
             )
         )  # fmt: skip

@@ -20,6 +20,7 @@ from antdrive.robots import Observation, TrackedPath, Twist
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import Progress, drive, ignore_progress
+from antdrive.sim.driving.guide import Follow
 from antdrive.sim.driving.parts import SILENT, Ending, Note
 from antdrive.sim.driving.plants import Bullet, Drive
 from antdrive.sim.facts import LoggedRun, result_of
@@ -174,7 +175,7 @@ class Session:
         self._by_itself = True  # whether its mind has given every command
         if self.plan.solved:
             self._route, self.path = guide.route(self.grid, self.plan)
-            self.mind.path = self.path
+            self.mind.way = Follow(self.path)
 
     def __enter__(self) -> Session:
         s = self._scenario

@@ -22,10 +22,10 @@ from antdrive.sim.compose import BLIND_SHARE, compose
 from antdrive.sim.driving.blockage import blocked_cells, covered_discs
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import drive, follow
-from antdrive.sim.driving.driver import Driver, OnePath, full_turn
-from antdrive.sim.driving.exploring import TurnToScan
+from antdrive.sim.driving.driver import Driver, full_turn
+from antdrive.sim.driving.guide import Follow, Guide, Moment, Wait
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import SIGHT_LIMIT, SILENT, Ending, Guide, Moment, Note, Step, StuckClock
+from antdrive.sim.driving.parts import SIGHT_LIMIT, SILENT, Ending, Note, Step, StuckClock
 from antdrive.sim.driving.plants import Bullet, Kinematic
 from antdrive.sim.driving.rules import (
     AVOIDING,
@@ -33,6 +33,7 @@ from antdrive.sim.driving.rules import (
     Avoid,
     KeepToSchedule,
     Pursuit,
+    TurnToScan,
     braked,
     slow_down,
     stopping_time,
@@ -62,8 +63,8 @@ def driver(robot, guide=None, *rules):
     tracked = controller.prepare(smooth(plan, grid, TASK), HALL, robot, 0.03, 1 / 60)
     pursuit = Pursuit(controller, full_turn(robot, 60))
     known = Briefing(robot, TASK.start, TASK.goal, TASK.goal_tolerance, 60, HALL)
-    made = Driver(known, guide or OnePath(), (pursuit, *rules))
-    made.path = tracked
+    made = Driver(known, guide or Guide(), (pursuit, *rules))
+    made.way = Follow(tracked)
     return made
 
 
@@ -144,8 +145,8 @@ def test_a_schedule_limits_the_speed_to_what_is_due_soon(turtlebot):
     assert [schedule.late(4.0, arc) for arc in (1.49, 1.51)] == [True, False]
     slower = slow_down(Twist(0.6, 0.3), Twist(0.6, 0.3), 0.0, 0.12)
     assert slower == pytest.approx((0.48, 0.24))
-    rule = KeepToSchedule(SimpleNamespace(schedule=schedule), replace(turtlebot, max_acceleration=1.2), 60)
-    now = SimpleNamespace(tick=120, before=Step(Twist(0.6, 0.0)))
+    rule = KeepToSchedule(replace(turtlebot, max_acceleration=1.2), 60)
+    now = SimpleNamespace(tick=120, way=Follow(None, schedule), before=Step(Twist(0.6, 0.0)))
     kept = rule.apply(now, Step(Twist(0.6, 0.3), PursuitState(arc=1.0)))
     assert kept.command == pytest.approx((0.58, 0.29))
     assert (kept.speed_limit, kept.waits) == (pytest.approx(0.5), False)
@@ -154,15 +155,19 @@ def test_a_schedule_limits_the_speed_to_what_is_due_soon(turtlebot):
 
 def test_a_robot_brakes_for_a_scan_turn_and_where_it_is_lost(turtlebot):
     goes = Step(Twist(0.5, 0.1), PursuitState())
-    now = SimpleNamespace(pose=TASK.start, before=goes)
-    for turn, lost in ((object(), False), (None, True), (None, False)):
-        found = TurnToScan(SimpleNamespace(scan_turn=turn, lost=lost), turtlebot, 60).apply(now, goes)
-        assert found.command == (goes.command if not (turn or lost) else braked(goes.command, turtlebot, 60))
+    braking = braked(goes.command, turtlebot, 60)
+    for way, command in (
+        (Wait(None, scan_turn=object()), braking),
+        (Wait(None), braking),
+        (Follow(None), goes.command),
+    ):
+        now = SimpleNamespace(pose=TASK.start, before=goes, way=way)
+        assert TurnToScan(turtlebot, 60).apply(now, goes).command == command
 
 
 def test_progress_is_a_fraction_of_the_route(turtlebot):
     half = driver(turtlebot)
-    assert at(half, half.path.length / 2).fraction == pytest.approx(0.5)
+    assert at(half, half.way.path.length / 2).fraction == pytest.approx(0.5)
 
 
 def test_turns_on_the_spot_add_the_time_of_a_full_turn_to_the_stuck_time(turtlebot):
@@ -175,7 +180,7 @@ def test_turns_on_the_spot_add_the_time_of_a_full_turn_to_the_stuck_time(turtleb
 
 
 def test_only_a_robot_that_did_not_get_there_reports_what_its_guide_noted(turtlebot):
-    noting = OnePath()
+    noting = Guide()
     noting.failure_note = "no route at t = {} s".format
     noted = driver(turtlebot, noting)
     for outcome in Outcome:
@@ -201,7 +206,7 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
     x, y = TASK.goal
     for distance, outcome in ((0.0, Outcome.SUCCEEDED), (0.3, Outcome.STUCK)):
         at_end = driver(turtlebot)
-        at(at_end, at_end.path.length)
+        at(at_end, at_end.way.path.length)
         ending = drive(standing((x, y - distance), (x, y)), at_end)  # the command comes to rest first
         assert ending.outcome is outcome
         lost = (
@@ -227,9 +232,9 @@ def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_ho
     nobody = GroundTruth(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
     sight = StoppingConstraint(None, turtlebot, 60, 0.1, lambda *_: None)
     sight.limit = lambda *_: (Twist(0.005, 0.0), True)
-    robot = driver(turtlebot, None, Avoid(calm, nobody, OnePath(), TASK, turtlebot, 60), sight)
+    robot = driver(turtlebot, None, Avoid(calm, nobody, TASK, turtlebot, 60), sight)
     body = standing(TASK.goal)
-    assert drive(body, at(robot, robot.path.length - 0.5)).outcome is Outcome.SUCCEEDED
+    assert drive(body, at(robot, robot.way.path.length - 0.5)).outcome is Outcome.SUCCEEDED
     assert robot.step.pursuit.limiter != LIMITERS.index("avoid")
     assert body.tick == 1
 
@@ -249,7 +254,7 @@ def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, tu
         noted = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
         monkeypatch.setattr("antdrive.sim.compose.avoidance_of", lambda _, noted=noted: noted)
         rule = next(rule for rule in compose(unknown)[2].rules if type(rule) is Avoid)
-        rule.apply(Moment(0, TASK.start, driver(robot).path, Step(), StuckClock()), Step())
+        rule.apply(Moment(0, TASK.start, driver(robot).way, Step(), StuckClock()), Step())
         slow = robot is jackal and perception.kind == "lidar"
         assert asked == [BLIND_SHARE * robot.max_speed if slow else math.inf]
 
@@ -257,25 +262,21 @@ def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, tu
 class OneReplan(Guide):
     """A guide that replans once, back along the path that it is given."""
 
-    def __init__(self):
-        self.log, self.path = [], None
+    way = None
 
-    def trigger(self, tick, *_):
-        return "now" if tick == 1 else ""
-
-    def replan(self, *_):
-        return self.path
+    def path(self, now, *, at_end=False):
+        return self.way if now.tick == 1 else now.way
 
 
 def test_a_replan_starts_its_route_from_the_beginning(turtlebot):
     monitor = OneReplan()
     robot = driver(turtlebot, monitor)
-    monitor.path = driver(turtlebot).path
+    monitor.way = driver(turtlebot).way
     robot.act(seen(0, (3.0, 3.0, 0.0), 0.5))
-    old = robot.path
+    old = robot.way
     assert robot.step.pursuit.arc > 0
     robot.act(seen(1, speed=0.5))
-    assert robot.path is monitor.path is not old
+    assert robot.way is monitor.way is not old
     assert robot.step.pursuit.arc == pytest.approx(0.0, abs=0.02)
 
 
@@ -336,7 +337,7 @@ def test_a_robot_that_brakes_stops_at_the_goal_if_both_ends_of_its_way_are_there
     assert TASK.goal_tolerance == 0.25
     for yaw, pose in ((0.0, (x - before, y, 0.0)), (np.pi / 2, (x, y - before, np.pi / 2))):
         nobody = GroundTruth(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
-        rule = Avoid(Avoidance(), nobody, OnePath(), TASK, turtlebot, 60)
+        rule = Avoid(Avoidance(), nobody, TASK, turtlebot, 60)
         assert rule._stops_at_goal(pose, Twist(speed, 0.0)) is stops, yaw
 
 
@@ -362,27 +363,20 @@ def test_a_robot_that_gives_way_is_not_stuck(turtlebot):
         step=0.1,
         avoid=lambda *_, **__: (Twist(0.0, 0.0), True, AvoidanceState()),
     )
-    waits = driver(turtlebot, None, Avoid(cautious, nobody, OnePath(), TASK, turtlebot, 60))
+    waits = driver(turtlebot, None, Avoid(cautious, nobody, TASK, turtlebot, 60))
     for tick in range(round(STUCK_TIME * 60) + 20):
         assert waits.act(seen(tick)) == ((0.0, 0.0), Note(TASK.start, AVOIDING))
 
 
 class Watcher(Guide):
-    """Guide that notes waiting, and replans after a missed goal."""
-
-    may_wait = True
+    """Guide that notes waiting, and waits after a missed goal."""
 
     def __init__(self):
-        self.log = []
-        self.waiting = []
-        self.misses = []
+        self.waiting, self.misses = [], []
 
-    def trigger(self, tick, pose, waiting, *_):
-        self.waiting.append(waiting)
-        return ""
-
-    def missed(self, tick, pose):
-        self.misses.append(pose)
+    def path(self, now, *, at_end=False):
+        (self.misses if at_end else self.waiting).append(now.waiting)
+        return now.way
 
 
 @pytest.mark.parametrize(
@@ -435,7 +429,7 @@ def test_a_goal_missed_by_the_estimate_triggers_a_replan(turtlebot, off, knows, 
     monitor, (x, y) = Watcher(), TASK.goal
     robot, body = driver(turtlebot, monitor), standing((x - true, y), (x - off, y))
     while body.ended is None:  # the command comes to rest first
-        robot.step = robot.step._replace(pursuit=PursuitState(arc=robot.path.length))
+        robot.step = robot.step._replace(pursuit=PursuitState(arc=robot.way.path.length))
         body.step(*robot.act(body.observe()))
     assert bool(monitor.misses) is knows
     assert body.ended.outcome is (Outcome.TIMED_OUT if knows else outcome)
@@ -455,7 +449,7 @@ def test_a_robot_that_stands_at_the_goal_has_arrived_whatever_it_commands():
 def test_a_path_is_followed_by_the_estimates_of_the_localiser(turtlebot):
     """At an estimate 0.5 m to the left of the robot, it turns right."""
     with Engine(TASK.world, turtlebot) as engine:
-        log = follow(engine, PurePursuit(), driver(turtlebot).path, TASK, limit=1.0, senses=Off((0, 0), (0, 0.5)))
+        log = follow(engine, PurePursuit(), driver(turtlebot).way.path, TASK, limit=1.0, senses=Off((0, 0), (0, 0.5)))
     assert log.pose[-1, 2] < -0.1
 
 
@@ -478,7 +472,7 @@ def test_a_robot_steers_from_where_it_will_be_when_its_next_command_takes_effect
 def test_progress_is_reported_ten_times_a_second(turtlebot):
     told = []
     with Engine(TASK.world, turtlebot) as engine:
-        tracked = driver(turtlebot).path
+        tracked = driver(turtlebot).way.path
         log = follow(engine, PurePursuit(), tracked, TASK, limit=1.0, progress=told.append)
     assert len(log.t) == 241
     assert len(told) == 10

@@ -19,6 +19,7 @@ from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, check, near_polyline, point_at, surrounding
 from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import INTERVAL
+from antdrive.sim.driving.guide import Follow
 from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import IDLE_TIME, Recovery, ScanTurn
@@ -517,7 +518,7 @@ def test_a_robot_without_a_path_at_the_end_of_its_route_keeps_searching_for_a_wh
     exploration = compose(s)[1]
     _, tracked = exploration.route(*exploration.first())
     robot = Driver(Briefing(jackal, task.start, task.goal, task.goal_tolerance, 60), exploration, ())
-    robot.path = tracked
+    robot.way = Follow(tracked)
     asked = []
     exploration.replan = lambda tick, pose, trigger: asked.append(trigger)
     exploration.lost = lost

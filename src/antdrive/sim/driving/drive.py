@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from antdrive.robots import PurePursuit, TrackedPath
 from antdrive.robots.control.observation import Briefing
 from antdrive.sim.driving.body import Body
-from antdrive.sim.driving.driver import Driver, OnePath, full_turn
+from antdrive.sim.driving.driver import Driver, full_turn
+from antdrive.sim.driving.guide import Follow, Guide, Rule
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.mover_sense import MoverSense
-from antdrive.sim.driving.parts import Ending, Rule
+from antdrive.sim.driving.parts import Ending
 from antdrive.sim.driving.perceived_movers import Given
 from antdrive.sim.driving.plants import Bullet, Drive
 from antdrive.sim.driving.rules import Pursuit
@@ -54,8 +55,8 @@ def follow(
     pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))
     sense, given = movers or (None, None)
     known = Briefing(engine.robot, task.start, task.goal, task.goal_tolerance, control_hz, task.world)
-    driver = Driver(known, OnePath(), (pursuit, *rules), given=given)
-    driver.path = path
+    driver = Driver(known, Guide(), (pursuit, *rules), given=given)
+    driver.way = Follow(path)
     plant = Bullet(engine, task.start, control_hz)
     localiser = localiser or Exact(task.start, 1 / control_hz)
     body = Body(plant, senses or Senses(), localiser, movers=sense, hz=control_hz, limit=limit, task=task)

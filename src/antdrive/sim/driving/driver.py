@@ -7,20 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from antdrive.base import Pose
-from antdrive.robots import LIMITERS, PursuitState, RobotSpec, TrackedPath, Twist
+from antdrive.robots import LIMITERS, PursuitState, RobotSpec, Twist
 from antdrive.robots.control.observation import Briefing, Observation
 from antdrive.robots.noise import moved_by
-from antdrive.sim.driving.parts import (
-    EXPLORING_LIMITERS,
-    Ending,
-    Guide,
-    Moment,
-    Note,
-    Rows,
-    Rule,
-    Step,
-    StuckClock,
-)
+from antdrive.sim.driving.guide import Follow, GiveUp, Guide, Moment, Rule, Wait
+from antdrive.sim.driving.parts import EXPLORING_LIMITERS, Ending, Note, Rows, Step, StuckClock
 from antdrive.sim.driving.perceived_movers import Given
 from antdrive.sim.driving.rules import WAITING_SPEED
 from antdrive.sim.driving.survey import Scans
@@ -38,12 +29,12 @@ class Driver:
         guide: provides the path
         rules: compute the command, in order
         scans: reads the lidar; None: unused
-        path: the current path
+        way: the current way
         step: the current step
         progress_periods: control periods between two reports of progress
     """
 
-    path: TrackedPath
+    way: Follow
 
     def __init__(
         self,
@@ -62,7 +53,7 @@ class Driver:
     @property
     def fraction(self) -> float:
         """Completed fraction of the route."""
-        return self.step.pursuit.arc / self.path.length
+        return self.step.pursuit.arc / self.way.path.length
 
     def act(self, now: Observation) -> tuple[Twist | None, Note]:
         """Return the command of one control period, None to stay where the robot stands, and a note on it."""
@@ -76,23 +67,22 @@ class Driver:
             return None, silent
         pose = moved_by(believed, now.pending, 1 / self._hz)
         waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
-        trigger = guide.trigger(now.tick, pose, waiting, self.path, before.pursuit.arc)
-        if trigger:
-            self._follow(guide.replan(now.tick, pose, trigger))
-        if guide.plan_error:
-            return None, silent._replace(ending=self._invalid_plan(now.tick))
-        if guide.blocked:
-            return None, silent._replace(ending=Ending(Outcome.BLOCKED, guide.blocked))
-        self.path = guide.refreshed(self.path, pose)
-        moment, step = Moment(now.tick, pose, self.path, self.step, self._clock), self.step
+        moment = Moment(now.tick, pose, self.way, before, self._clock, waiting)
+        answer = guide.path(moment)
+        if isinstance(answer, GiveUp):
+            return None, silent._replace(ending=answer.ending)
+        self._follow(answer)
+        moment, step = Moment(now.tick, pose, self.way, self.step, self._clock), self.step
         for rule in self.rules:
             step = rule.apply(moment, step)
         self.step = step
-        if self._at_end_of_route(pose, now.twist, before.command) and not (
-            self._follow(guide.missed(now.tick, pose)) or guide.may_wait
-        ):
-            return None, silent._replace(ending=self._invalid_plan(now.tick) if guide.plan_error else None)
-        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scan_turning)
+        if self._at_end_of_route(pose, now.twist, before.command):
+            answer = guide.path(moment, at_end=True)
+            if isinstance(answer, GiveUp):
+                return None, silent._replace(ending=answer.ending)
+            self._follow(answer)
+        turns = isinstance(self.way, Wait) and self.way.scan_turn is not None
+        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or turns)
         return step.command, Note(believed, step.pursuit.limiter, self._gives_up())
 
     @property
@@ -118,34 +108,21 @@ class Driver:
             return ending
         return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self.guide.failure_note(tick)))))
 
-    def _follow(self, path: TrackedPath | None) -> bool:
-        """Switch to a new path, and return whether there is one."""
-        if path is None:
-            return False
-        self.path = path
-        self.step = self.step._replace(pursuit=PursuitState(limiter=self.step.pursuit.limiter))
-        self._clock = self._clock._replace(farthest=0.0)
-        return True
+    def _follow(self, way: Follow) -> None:
+        """Follow a way, whose route may be new."""
+        if way.path.route is not self.way.path.route:
+            self.step = self.step._replace(pursuit=PursuitState(limiter=self.step.pursuit.limiter))
+            self._clock = self._clock._replace(farthest=0.0)
+        self.way = way
 
     def _at_end_of_route(self, pose: Pose, twist: Twist, last: Twist) -> bool:
         """Return whether the robot stands at the end of its route, and not at the goal, where it arrives in the next period."""
-        path, (command, pursuit, *_), known = self.path, self.step, self.briefing
+        path, (command, pursuit, *_), known = self.way.path, self.step, self.briefing
         if path.length - pursuit.arc > path.goal_distance or any(command) or not stopped(twist, last):
             return False
         return math.dist(pose[:2], known.goal) > known.tolerance
-
-    def _invalid_plan(self, tick: int) -> Ending:
-        """Return the ending after an invalid plan."""
-        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self.guide.plan_error}")
 
 
 def full_turn(robot: RobotSpec, hz: int) -> int:
     """Return the number of control periods of a full turn on the spot."""
     return round(2 * math.pi / robot.max_yaw_rate * hz)
-
-
-class OnePath(Guide):
-    """Guide that keeps one path."""
-
-    def __init__(self) -> None:
-        self.log, self.walls = [], []

@@ -7,8 +7,8 @@ import dataclasses
 from antdrive.base.caches import Keyed, bits, cached
 from antdrive.planners import PlanResult, PlanStatus, TimedPlan, smooth
 from antdrive.robots import TrackedPath
+from antdrive.sim.driving.guide import Follow, RouteGuide
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
-from antdrive.sim.driving.parts import RouteGuide
 from antdrive.sim.driving.route_planner import RoutePlanner, by_contents
 from antdrive.sim.driving.schedule import Schedule
 from antdrive.sim.log.streams import random_stream
@@ -19,19 +19,7 @@ from antdrive.worlds import Grid, Route
 class OneRoute(RouteGuide):
     """Guide that keeps the first route. Its grid has no movers; space-time planners get their motions."""
 
-    def __init__(self, planner: RoutePlanner) -> None:
-        self.log, self.walls = [], []
-        self._routes = planner
-
-    @property
-    def plan_error(self) -> str:
-        """Why the planner's plan is invalid; empty if it is valid."""
-        return self._routes.plan_error
-
-    @property
-    def footprint_margin(self) -> float | None:
-        """Clearance of plans that keep the footprint clear [m]; None while all keep the disc clear."""
-        return self._routes.footprint_margin
+    schedule: Schedule | None = None  # of its timed plan
 
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start; report no path if the start is too narrow to follow it."""
@@ -57,6 +45,9 @@ class OneRoute(RouteGuide):
         route, path = self._prepared(grid, plan)
         self._track(plan, route)
         return route, path
+
+    def _way(self, path: TrackedPath) -> Follow:
+        return Follow(path, self.schedule)
 
     def _track(self, plan: PlanResult, route: Route) -> None:
         """Set the schedule of a new route, among movers of known motions."""

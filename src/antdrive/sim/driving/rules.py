@@ -10,8 +10,9 @@ import numpy as np
 from antdrive.base import Pose
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, TrackedPath, Twist
 from antdrive.sim.driving.blockage import points_at
+from antdrive.sim.driving.guide import Moment, Wait
 from antdrive.sim.driving.habits import Habits
-from antdrive.sim.driving.parts import Guide, Moment, Step
+from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.worlds import Task
 
@@ -48,19 +49,39 @@ class Pursuit:
         """Return the controller's command."""
         last, before = now.before.command, now.before.pursuit
         if now.clock.turning <= self._full_turn:
-            return Step(*self._controller.step(now.path, now.pose, last, before))
-        return Step(*self._controller.step(now.path.preferring_arcs, now.pose, last, before._replace(turning=False)))
+            return Step(*self._controller.step(now.way.path, now.pose, last, before))
+        return Step(
+            *self._controller.step(now.way.path.preferring_arcs, now.pose, last, before._replace(turning=False))
+        )
+
+
+class TurnToScan:
+    """Rule: make the scan turn once the robot stands; stop where it has no path."""
+
+    def __init__(self, robot: RobotSpec, hz: int) -> None:
+        self._robot, self._hz = robot, hz
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """Return the scan turn's command, or one that brakes for it."""
+        way, last = now.way, now.before.command
+        if not isinstance(way, Wait):
+            return step
+        if way.scan_turn is not None and not last.speed:
+            turning = step.pursuit._replace(limiter=ROTATING)
+            return step._replace(command=way.scan_turn.command(now.pose, last), pursuit=turning, speed_limit=0.0)
+        command = braked(last, self._robot, self._hz)
+        return step._replace(command=command, speed_limit=max(command.speed, 0.0))
 
 
 class KeepToSchedule:
     """Rule: keep to the schedule of a plan in space and time."""
 
-    def __init__(self, guide: Guide, robot: RobotSpec, hz: int) -> None:
-        self._guide, self._hz, self._max_change = guide, hz, robot.max_acceleration / hz
+    def __init__(self, robot: RobotSpec, hz: int) -> None:
+        self._hz, self._max_change = hz, robot.max_acceleration / hz
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the command, limited to the schedule's speed."""
-        schedule = self._guide.schedule
+        schedule = now.way.schedule
         if schedule is None:
             return step
         limit = schedule.speed_limit(now.tick / self._hz, step.pursuit.arc)
@@ -80,7 +101,7 @@ class SlowAtCorners:
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the command, limited to the speed for the corners ahead."""
-        limit = self.limit(now.path, step.pursuit.arc, step.command.speed)
+        limit = self.limit(now.way.path, step.pursuit.arc, step.command.speed)
         if limit >= step.command.speed:
             return step
         command = slow_down(step.command, now.before.command, limit, self._max_change)
@@ -105,7 +126,6 @@ class Avoid:
         self,
         avoidance: Avoidance,
         movers: PerceivedMovers,
-        guide: Guide,
         task: Task,
         robot: RobotSpec,
         hz: int,
@@ -116,15 +136,14 @@ class Avoid:
         losses: tuple[float, float] = (0.0, 0.0),  # see `Avoidance.avoid`
         habits: Habits | None = None,  # a second prediction of movers
     ) -> None:
-        self._avoidance, self._movers, self._guide = avoidance, movers, guide
-        self._task, self._robot, self._hz = task, robot, hz
+        self._avoidance, self._movers, self._task, self._robot, self._hz = avoidance, movers, task, robot, hz
         self._goal_share, self._backwards, self._delay, self._losses = goal_share, backwards, delay, losses
         self._habits = habits
         self._state = AvoidanceState()
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the command that avoids movers."""
-        avoidance, (tick, pose, path, before, _) = self._avoidance, now
+        avoidance, (tick, pose, way, before, *_) = self._avoidance, now
         last, ahead = before.command, avoidance.prediction_times
         stopping = before.avoids and self._stops_at_goal(pose, last)
         if stopping:
@@ -135,14 +154,14 @@ class Avoid:
         ahead = ahead + self._delay
         movers, radii = self._movers.predict(tick, pose[:2], ahead)
         velocities = self._movers.velocities(tick, pose[:2])
-        kept = radii - self._guide.clearance_reduction(tick, pose[:2])
+        kept = radii - way.blockage.clearance_reduction(tick, pose[:2]) if way.blockage else radii
         if self._habits is not None:
             again, sizes = self._habits.predict(tick, pose[:2], ahead, movers, radii)
             if len(sizes):
                 movers, kept = np.concatenate((movers, again), axis=1), np.concatenate((kept, sizes))
                 velocities = np.concatenate((velocities, (again[1] - again[0]) / avoidance.step))
         command, avoids, self._state = avoidance.avoid(
-            path,
+            way.path,
             self._robot,
             pose,
             last,

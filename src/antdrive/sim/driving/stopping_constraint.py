@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 from antdrive.base import Pose
 from antdrive.robots import RobotSpec, Twist
-from antdrive.sim.driving.parts import SIGHT_LIMIT, Moment, Step
+from antdrive.sim.driving.guide import Moment
+from antdrive.sim.driving.parts import SIGHT_LIMIT, Step
 from antdrive.sim.driving.rules import stopping_time
 from antdrive.sim.driving.survey import Survey
 
