@@ -87,7 +87,7 @@ class Off(Senses):
 
 def standing(true, believed=None, periods=9):
     """The body of a robot that stands at a true position and believes to be elsewhere."""
-    plant = Kinematic((*true, 0.0), lambda pose, twist: np.array([pose]))
+    plant = Kinematic((*true, 0.0), 0.0, load_robot("turtlebot"))
     return Body(plant, Off(true, believed or true), Exact(TASK.start, 1 / 60), hz=60, limit=periods / 60, task=TASK)
 
 
@@ -414,7 +414,7 @@ class EndsAt:
 def test_the_reason_is_that_of_the_period_in_which_the_drive_ends():
     for last, outcome, asked in ((3, Outcome.STUCK, 3), (0, Outcome.STUCK, 0), (99, Outcome.TIMED_OUT, 30)):
         for command, steps in ((None, asked), (Twist(0.0, 0.0), min(asked + 1, 30))):
-            plant = Kinematic(TASK.start, lambda pose, twist: np.array([pose]))
+            plant = Kinematic(TASK.start, 0.0, load_robot("turtlebot"))
             mind = EndsAt(last, command)
             body = Body(plant, Senses(), Exact(TASK.start, 1 / 60), hz=60, limit=0.5)
             assert drive(body, mind).outcome is outcome
@@ -455,7 +455,7 @@ def test_a_path_is_followed_by_the_estimates_of_the_localiser(turtlebot):
 
 def test_a_robot_steers_from_where_it_will_be_when_its_next_command_takes_effect(turtlebot):
     """Three commands have not reached its motors yet: 0.1, 0.2 and 0.3 m/s."""
-    plant = Kinematic(TASK.start, lambda pose, twist: np.array([pose]))
+    plant = Kinematic(TASK.start, 0.0, load_robot("turtlebot"))
     delayed = NoisySenses(Noise(delay=0.05), turtlebot.track, 1 / 60, 0)
     body = Body(plant, delayed, Exact(TASK.start, 1 / 60), hz=60, limit=1.0)
     for speed in (0.1, 0.2, 0.3):

@@ -20,7 +20,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import PlannerError
 from antdrive.robots import PursuitState, Twist, footprint_clearance
-from antdrive.robots.noise import moved, moved_by
+from antdrive.robots.noise import moved_by
 from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.sim.compose import route_planner
 from antdrive.sim.driving.body import Body
@@ -123,7 +123,7 @@ def rehearsed_clearance(s: Scenario) -> float:
     route, path = OneRoute(known).route(grid, answer)
     period = 1 / s.control_hz
     measured = positioning("fixes", s.robot, s.noise, 1.0, period, s.task.start, s.seed)
-    plant = Kinematic(s.task.start, lambda pose, twist: np.array([moved(pose, Twist(*(period * v for v in twist)))]))
+    plant = Kinematic(s.task.start, period, s.robot)
     limit = SETTLING + PATIENCE * route.length / s.robot.max_speed
     body = Body(plant, *measured, hz=s.control_hz, limit=limit)
     command, state = Twist(0.0, 0.0), PursuitState()

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
-from antdrive.base import Floats, Pose
+from antdrive.base import Pose
 from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, Twist, footprint_clearance
 from antdrive.robots.clearance import footprint_distances, obstacle_name
 from antdrive.sim.driving.body import Body
@@ -16,7 +12,6 @@ from antdrive.sim.driving.senses import Senses
 from antdrive.worlds import World, point_clearance
 
 REHEARSED = 60.0  # limit of the rehearsal; the drive decides what follows [s]
-STEP = 2e-4  # longest motion of a footprint point between two checked poses [m]
 
 
 def is_narrow(world: World, robot: RobotSpec, pose: Pose) -> bool:
@@ -62,11 +57,7 @@ def _rehearsed(
 
     With `halts`, a stop by the controller ends it, too.
     """
-    plant = Kinematic(
-        start,
-        lambda pose, twist: _way(pose, twist, 1 / hz, robot.radius),
-        lambda way: bool((footprint_clearance(world, robot.footprint, way) <= 0).any()),
-    )
+    plant = Kinematic(start, 1 / hz, robot, world)
     body = Body(plant, Senses(), Exact(start, 1 / hz), hz=hz, limit=REHEARSED)
     command, state = Twist(0.0, 0.0), PursuitState()
     while body.ended is None:
@@ -82,14 +73,3 @@ def _rehearsed(
 
 def _room(world: World, pose: Pose) -> float:
     return float(point_clearance(world, [pose[:2]])[0])
-
-
-def _way(pose: Pose, command: Twist, period: float, radius: float) -> Floats:
-    """Return the poses (K, 3) of a robot of this radius during a period, without the first."""
-    speed, yaw_rate = command
-    count = max(1, math.ceil((abs(speed) + abs(yaw_rate) * radius) * period / STEP))
-    t = period * np.arange(1, count + 1) / count
-    x, y, yaw = pose
-    half = yaw_rate * t / 2
-    chord = speed * t * np.sinc(half / np.pi)
-    return np.stack([x + chord * np.cos(yaw + half), y + chord * np.sin(yaw + half), yaw + 2 * half], axis=1)
