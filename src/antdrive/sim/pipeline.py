@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.progress import progress_bar
 from antdrive.base.version import require_physics, versions
-from antdrive.planners import PlanResult, PlanStatus
+from antdrive.planners import PlanResult
 from antdrive.robots import Observation, TrackedPath, Twist
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.body import Body
@@ -23,118 +21,21 @@ from antdrive.sim.driving.drive import Progress, drive, ignore_progress
 from antdrive.sim.driving.guide import Follow
 from antdrive.sim.driving.parts import SILENT, Ending, Note
 from antdrive.sim.driving.plants import Bullet, Drive
-from antdrive.sim.facts import LoggedRun, result_of
-from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.facts import ENDED_BY as ENDED_BY
+from antdrive.sim.facts import Run as Run
+from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.contacts import attributed
-from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ComponentRecord, DriveRecord, SmoothingRecord, TimesRecord, settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import configuration_of, plan_record
-from antdrive.sim.scenario import Scenario, picture_of, usual_time_limit
+from antdrive.sim.scenario import Scenario, usual_time_limit
 from antdrive.sim.written import Written
 from antdrive.worlds import Grid
-from antdrive.worlds.svg import card
 
 if TYPE_CHECKING:
     from types import TracebackType
-
-ENDED_BY = {
-    PlanStatus.NO_PATH: Outcome.NO_PATH,
-    PlanStatus.STOPPED: Outcome.STOPPED,
-    PlanStatus.INVALID: Outcome.INVALID_PLAN,
-}
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """Result of a scenario: a plan and, if the planner found a path, a rollout with its certificate.
-
-    Attributes:
-        scenario: the scenario
-        grid: the planning grid
-        plan: the planner's answer
-        rollout: the log of the drive; None if planning found no path
-        certificate: the collision certificate of the log; None without a rollout
-    """
-
-    scenario: Scenario
-    grid: Grid
-    plan: PlanResult
-    rollout: Rollout | None = None
-    certificate: Certificate | None = None
-
-    @property
-    def outcome(self) -> Outcome:
-        """How the run ended."""
-        if self.rollout is not None:
-            return self.rollout.outcome
-        return ENDED_BY[self.plan.status]
-
-    @property
-    def reason(self) -> str:
-        """Details beyond the outcome's sentence; may be empty."""
-        return self.rollout.record.reason if self.rollout is not None else self.plan.reason
-
-    @property
-    def certified(self) -> bool:
-        """Whether the drive is certified free of contact."""
-        return self.certificate is not None and self.certificate.certified
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether the robot stopped at the goal in time, certified free of contact."""
-        return self.outcome is Outcome.SUCCEEDED and self.certified
-
-    @functools.cached_property
-    def logged(self) -> LoggedRun | None:
-        """The log with its certificate; None without a log."""
-        return None if self.rollout is None else LoggedRun(self.rollout, self.certificate or certify(self.rollout))
-
-    @property
-    def metrics(self) -> dict[str, float]:
-        """Metrics of the drive by name, as defined in `METRICS`.
-
-        Raises:
-            ValueError: the run has no rollout, because planning found no path.
-        """
-        return dict(self._driven().metrics)
-
-    def metric(self, name: str) -> float:
-        """Return one metric of the drive, such as `run.metric("spl")`.
-
-        Raises:
-            ValueError: the run has no rollout, because planning found no path; or the metric is unknown.
-        """
-        log = self._driven()
-        if name not in METRICS:
-            raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
-        return log.metrics[name]
-
-    def _driven(self) -> LoggedRun:
-        if self.logged is None:
-            reason = f": {self.reason}" if self.reason else ""
-            raise ValueError(f"no rollout: planning ended with {self.outcome.key}{reason}")
-        return self.logged
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, for JSON; `docs/reference/rollout-format.md` lists the keys."""
-        return result_of(self)
-
-    def __repr__(self) -> str:
-        s, log = self.scenario, self.rollout
-        reason = f" ({self.reason:.200})" if self.reason else ""
-        drive = f", {log.t[-1]:.1f} s" if log is not None else ""
-        proof = f", {self.certificate.statement}" if self.certificate is not None else ""
-        return f"<Run of {s.planner_label} in {s.task.world.name}: {self.outcome.value}{reason}{drive}{proof}>"
-
-    def _repr_html_(self) -> str:
-        s, more = self.scenario, {"reason": self.reason} if self.reason else {}
-        if self.rollout is not None:
-            return self.rollout.card(certified="yes" if self.certified else "no", **more)
-        facts = {"planner": s.planner_label, "robot": s.robot.name, **more}
-        return card(picture_of(s), f"{s.task.world.name}: {self.outcome.value}", facts)
 
 
 class Session:
