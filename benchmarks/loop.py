@@ -33,11 +33,11 @@ from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import follow
 from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.mover_sense import MoverSense
 from antdrive.sim.driving.perceived_movers import Given
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.driving.replanning import Replanning
 from antdrive.sim.driving.rules import Avoid
+from antdrive.sim.driving.senses import MoverSense
 from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.physics.engine import CHASSIS_AND_ANY, Engine
 from antdrive.worlds import Cruising, Disc, Route, Task, Trajectories, World

@@ -95,12 +95,10 @@ BODY = {
     "body",
     "drive",
     "leaving",
-    "mover_sense",
     "odometry",
     "plants",
     "routes",
     "senses",
-    "simulated_lidar",
 }
 
 

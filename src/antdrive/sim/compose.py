@@ -19,7 +19,6 @@ from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.guide import RouteGuide, Rule
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.mover_sense import MoverSense
 from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
 from antdrive.sim.driving.perceived_movers import Given, PerceivedMovers, Tracked
@@ -27,8 +26,7 @@ from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.route_planner import RoutePlanner
 from antdrive.sim.driving.routes import OneRoute
 from antdrive.sim.driving.rules import GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, SlowAtCorners, TurnToScan
-from antdrive.sim.driving.senses import Senses, positioning
-from antdrive.sim.driving.simulated_lidar import SimulatedLidar
+from antdrive.sim.driving.senses import MoverSense, Senses, SimulatedLidar, positioning
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverDetector, Survey, turning_room
 from antdrive.sim.policy import Perception

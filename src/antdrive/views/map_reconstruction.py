@@ -10,7 +10,7 @@ import numpy.typing as npt
 from antdrive.base.plane import relative_frame
 from antdrive.base.types import Flags, Floats, Pose
 from antdrive.sim.driving.mover_tracking import MAP_CELL
-from antdrive.sim.driving.simulated_lidar import start_ground
+from antdrive.sim.driving.senses import start_ground
 from antdrive.sim.driving.survey import RECENT, horizon_of, reset_ticks, turning_room
 from antdrive.sim.log.rollout import Rollout, estimates_of, ranges_of
 from antdrive.sim.log.sights import lidar_of, meet

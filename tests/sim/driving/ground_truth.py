@@ -3,8 +3,8 @@
 import dataclasses
 import math
 
-from antdrive.sim.driving.mover_sense import MoverSense
 from antdrive.sim.driving.perceived_movers import Given
+from antdrive.sim.driving.senses import MoverSense
 
 
 class GroundTruth(Given):

@@ -23,7 +23,7 @@ from antdrive.sim.driving.blockage import blocked_cells, covered_discs
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import drive, follow
 from antdrive.sim.driving.driver import Driver, full_turn
-from antdrive.sim.driving.guide import Follow, Guide, Moment, Wait
+from antdrive.sim.driving.guide import Follow, Guide, Moment, Schedule, Wait
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import SIGHT_LIMIT, SILENT, Ending, Note, Step, StuckClock
 from antdrive.sim.driving.plants import Bullet, Kinematic
@@ -38,7 +38,6 @@ from antdrive.sim.driving.rules import (
     slow_down,
     stopping_time,
 )
-from antdrive.sim.driving.schedule import Schedule
 from antdrive.sim.driving.senses import NoisySenses, Senses
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME

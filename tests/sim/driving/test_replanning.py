@@ -23,10 +23,10 @@ from antdrive.planners import (
 from antdrive.robots import Footprint, Twist
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, route_planner
+from antdrive.sim.driving.guide import MAX_LAG, Schedule
 from antdrive.sim.driving.replanning import CellByCell
 from antdrive.sim.driving.route_planner import outlined_grid_of
 from antdrive.sim.driving.rules import KeepToSchedule, slow_down
-from antdrive.sim.driving.schedule import MAX_LAG, Schedule
 from antdrive.sim.log.metrics import tracking_error_max_m
 from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
 from antdrive.worlds.world import by_geometry

@@ -10,7 +10,7 @@ import pytest
 
 from antdrive.sim import Perception, Scenario
 from antdrive.sim.driving.driver import Driver
-from antdrive.sim.driving.mover_sense import MoverSense
+from antdrive.sim.driving.senses import MoverSense
 from antdrive.sim.pipeline import driven
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World
 from tests.records import changed

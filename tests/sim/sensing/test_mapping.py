@@ -9,7 +9,7 @@ import pytest
 from hypothesis import strategies as st
 
 from antdrive.robots import Footprint, Lidar
-from antdrive.sim.driving.simulated_lidar import start_ground
+from antdrive.sim.driving.senses import start_ground
 from antdrive.sim.sensing import OccupancyMap, Scanner, clear_way, shape_of
 from antdrive.sim.sensing._kernels_mapping import SQUARE, begins
 from antdrive.worlds import Disc, World

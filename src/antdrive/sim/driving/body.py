@@ -11,10 +11,8 @@ from antdrive.base import Pose
 from antdrive.robots import Twist
 from antdrive.robots.control.observation import NOBODY, Observation
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.mover_sense import MoverSense
 from antdrive.sim.driving.parts import SILENT, Ending, Note, Rows
-from antdrive.sim.driving.senses import Senses
-from antdrive.sim.driving.simulated_lidar import SimulatedLidar
+from antdrive.sim.driving.senses import MoverSense, Senses, SimulatedLidar
 from antdrive.sim.log.ending import arrived, control_periods, outcome_at
 from antdrive.sim.log.outcome import Outcome
 

@@ -10,12 +10,11 @@ from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.driver import Driver, full_turn
 from antdrive.sim.driving.guide import Follow, Guide, Rule
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.mover_sense import MoverSense
 from antdrive.sim.driving.parts import Ending
 from antdrive.sim.driving.perceived_movers import Given
 from antdrive.sim.driving.plants import Bullet, Drive
 from antdrive.sim.driving.rules import Pursuit
-from antdrive.sim.driving.senses import Senses
+from antdrive.sim.driving.senses import MoverSense, Senses
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Task
 

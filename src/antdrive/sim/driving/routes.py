@@ -7,10 +7,9 @@ import dataclasses
 from antdrive.base.caches import Keyed, bits, cached
 from antdrive.planners import PlanResult, PlanStatus, TimedPlan, smooth
 from antdrive.robots import TrackedPath
-from antdrive.sim.driving.guide import Follow, RouteGuide
+from antdrive.sim.driving.guide import Follow, RouteGuide, Schedule
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
 from antdrive.sim.driving.route_planner import RoutePlanner, by_contents
-from antdrive.sim.driving.schedule import Schedule
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.reasons import no_path_reason
 from antdrive.worlds import Grid, Route
