@@ -253,7 +253,7 @@ def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, tu
         noted = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
         monkeypatch.setattr("antdrive.sim.compose.avoidance_of", lambda _, noted=noted: noted)
         rule = next(rule for rule in compose(unknown)[2].rules if type(rule) is Avoid)
-        rule.apply(Moment(0, TASK.start, driver(robot).way, Step(), StuckClock()), Step())
+        rule.apply(Moment(seen(), driver(robot).way, Step(), StuckClock()), Step())
         slow = robot is jackal and perception.kind == "lidar"
         assert asked == [BLIND_SHARE * robot.max_speed if slow else math.inf]
 

@@ -64,15 +64,24 @@ def parts(now):
     return [*now[:4], now.scan if now.scan is not None else math.nan, *now.movers]
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_robots_act_alike_until_they_observe_a_difference(kind, monkeypatch):
-    truth, robot = KINDS[kind]
+def unlike(monkeypatch, truth, robot):
+    """The control periods in which two drives act unlike each other before they observe a difference."""
     one, other = acted(monkeypatch, **robot), acted(monkeypatch, **{**robot, **truth})
     pairs = list(zip(one, other, strict=False))
     alike = next((k for k, (a, b) in enumerate(pairs) if not same(a[0], b[0])), len(pairs))
     assert alike > 30, "the drives differ too soon to tell anything"
-    for (now, action), (_, again) in pairs[:alike]:
-        assert action == again, now.tick
+    return [now.tick for (now, action), (_, again) in pairs[:alike] if action != again]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_robots_act_alike_until_they_observe_a_difference(kind, monkeypatch):
+    assert unlike(monkeypatch, *KINDS[kind]) == []
+
+
+def test_a_robot_that_is_given_the_later_ways_of_movers_acts_on_them(monkeypatch):
+    """So the test above finds a mind that knows more than it observes."""
+    truth, robot = KINDS["a mover's later way"]
+    assert unlike(monkeypatch, truth, {**robot, "perception": Perception(kind="motions")})
 
 
 def test_a_robot_is_given_the_movers_near_its_range_and_their_motion_since_the_last_period():

@@ -67,12 +67,13 @@ class Driver:
             return None, silent
         pose = moved_by(believed, now.pending, 1 / self._hz)
         waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
-        moment = Moment(now.tick, pose, self.way, before, self._clock, waiting)
+        seen = now._replace(pose=pose)
+        moment = Moment(seen, self.way, before, self._clock, waiting)
         answer = guide.path(moment)
         if isinstance(answer, GiveUp):
             return None, silent._replace(ending=answer.ending)
         self._follow(answer)
-        moment, step = Moment(now.tick, pose, self.way, self.step, self._clock), self.step
+        moment, step = Moment(seen, self.way, self.step, self._clock), self.step
         for rule in self.rules:
             step = rule.apply(moment, step)
         self.step = step

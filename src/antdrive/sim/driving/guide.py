@@ -12,7 +12,7 @@ import numpy as np
 from antdrive.base import Floats, Pose
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import PlanResult, TimedPlan
-from antdrive.robots import TrackedPath
+from antdrive.robots import Observation, TrackedPath
 from antdrive.sim.driving.blockage import Blockage
 from antdrive.sim.driving.parts import Ending, Rows, Step, StuckClock
 from antdrive.sim.driving.recovery import ScanTurn
@@ -95,12 +95,21 @@ class GiveUp(NamedTuple):
 class Moment(NamedTuple):
     """Input of guide and rules in one control period."""
 
-    tick: int  # the number of the control period
-    pose: Pose  # estimated pose when the command takes effect
+    observed: Observation  # with the estimated pose when the command takes effect
     way: Follow  # the current way; the guide gets the last one
     before: Step  # the step of the previous control period
     clock: StuckClock  # time without progress
     waiting: bool = False  # whether the robot stands to let a mover pass
+
+    @property
+    def tick(self) -> int:
+        """The number of the control period."""
+        return self.observed.tick
+
+    @property
+    def pose(self) -> Pose:
+        """Estimated pose when the command takes effect."""
+        return self.observed.pose
 
 
 class Rule(Protocol):

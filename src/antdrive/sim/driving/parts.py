@@ -1,8 +1,4 @@
-"""Interfaces of a drive's parts. `antdrive.sim.compose` selects the implementations.
-
-One control period: the plant returns the robot's state, the localiser estimates the pose, a due scan enters the map
-and may correct the estimate, the guide provides the path, the rules compute the command, and the plant executes it.
-"""
+"""Commands of a drive, notes on them, its ending, and rows of its log."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ class Avoid:
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the command that avoids movers."""
-        avoidance, (tick, pose, way, before, *_) = self._avoidance, now
+        avoidance, tick, pose, way, before = self._avoidance, now.tick, now.pose, now.way, now.before
         last, ahead = before.command, avoidance.prediction_times
         stopping = before.avoids and self._stops_at_goal(pose, last)
         if stopping:
