@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from antdrive.base.errors import FieldError
+from antdrive.base.guarded import error_text
 from antdrive.base.progress import progress_bar
 from antdrive.base.version import require_physics, versions
 from antdrive.planners import PlanResult
@@ -93,7 +94,7 @@ class Session:
     ) -> None:
         with self._open:
             if self._body is not None:
-                left = Ending(Outcome.STOPPED, "left by the loop that commanded it" if error is None else repr(error))
+                left = Ending(Outcome.STOPPED, error_text(error) if error else "left by the loop that commanded it")
                 ending = self.mind.with_reason(self._body.ended or left, self._body.tick)
                 self.rollout = self._logged(self._body, self._plant.finish(ending))
 
