@@ -10,24 +10,26 @@ import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from antdrive.base.errors import FieldError
-from antdrive.planners import PlanResult, PlanStatus
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import METRICS, measure, succeeded
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord, plain_value, settings_of
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.scenario import Scenario, picture_of
 from antdrive.sim.settings import SETTINGS
-from antdrive.worlds import Grid
-from antdrive.worlds.svg import card
+
+if TYPE_CHECKING:
+    from antdrive.planners import PlanResult
+    from antdrive.sim.scenario import Scenario
+    from antdrive.worlds import Grid
+
 
 ENDED_BY = {
-    PlanStatus.NO_PATH: Outcome.NO_PATH,
-    PlanStatus.STOPPED: Outcome.STOPPED,
-    PlanStatus.INVALID: Outcome.INVALID_PLAN,
+    "NO_PATH": Outcome.NO_PATH,
+    "STOPPED": Outcome.STOPPED,
+    "INVALID": Outcome.INVALID_PLAN,
 }
 #: Map, localisation and odometry of a log whose record leaves them out, as at their defaults.
 SENSED: Mapping[str, Any] = {name: SETTINGS[name].default for name in ("map", "localisation", "odometry")}
@@ -86,7 +88,7 @@ class Run:
         """How the run ended."""
         if self.rollout is not None:
             return self.rollout.outcome
-        return ENDED_BY[self.plan.status]
+        return ENDED_BY[self.plan.status.name]
 
     @property
     def reason(self) -> str:
@@ -146,6 +148,9 @@ class Run:
         return f"<Run of {s.planner_label} in {s.task.world.name}: {self.outcome.value}{reason}{drive}{proof}>"
 
     def _repr_html_(self) -> str:
+        from antdrive.sim.scenario import picture_of
+        from antdrive.worlds.svg import card
+
         s, more = self.scenario, {"reason": self.reason} if self.reason else {}
         if self.rollout is not None:
             return self.rollout.card(certified="yes" if self.certified else "no", **more)

@@ -101,7 +101,7 @@ class Session:
     @property
     def ended(self) -> Ending | None:
         """How the drive ended; None while it goes on."""
-        return self._body.ended if self._body is not None else Ending(ENDED_BY[self.plan.status], self.plan.reason)
+        return self._body.ended if self._body is not None else Ending(ENDED_BY[self.plan.status.name], self.plan.reason)
 
     @property
     def run(self) -> Run:
