@@ -26,11 +26,11 @@ from typing import Any
 import numpy as np
 
 from antdrive.sim import Scenario, run
-from antdrive.sim.driving import drive
+from antdrive.sim.driving.body import Body
+from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import SimulatedLidar
-from antdrive.sim.sensing import OccupancyMap
+from antdrive.sim.sensing import OccupancyMap, Scanner
 from antdrive.sim.sensing.matching import ScanMatcher
 from benchmarks.drives import barn_tasks
 from benchmarks.markdown import command_line, print_table
@@ -99,9 +99,10 @@ def costs(meter: Meter, scenario: Scenario, drives: int) -> tuple[dict[str, floa
 
 def rows(source: Path, drives: int, worlds: int) -> Iterator[list[str]]:
     meter = Meter()
-    meter.watch(drive, "_control_period", PERIOD)
+    for owner, method in ((Body, "observe"), (Driver, "act"), (Body, "step")):
+        meter.watch(owner, method, PERIOD)
     for owner, method, name in (
-        (SimulatedLidar, "ranges", "scan"),
+        (Scanner, "scan", "scan"),
         (ScanMatcher, "corrected", "match"),
         (OccupancyMap, "insert", "map"),
         (Exploration, "trigger", "watch"),

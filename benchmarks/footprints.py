@@ -35,7 +35,7 @@ from antdrive.robots.default_margin import line_margin
 from antdrive.runs.campaigns import make_campaign, sweep
 from antdrive.runs.margins.loss import loss_on_course
 from antdrive.sim.compose import route_planner
-from antdrive.sim.driving.routes import grid_of
+from antdrive.sim.driving.route_planner import grid_of
 from antdrive.sim.scenario import LossFactors, Scenario
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 from antdrive.worlds.headings import Outline, turn_clear

@@ -29,13 +29,15 @@ import numpy as np
 
 from antdrive.robots import Avoidance, PurePursuit, TrackedPath, load_robot
 from antdrive.sim import Perception, Scenario, run
-from antdrive.sim.driving import drive
-from antdrive.sim.driving.drive import OnePath, follow
+from antdrive.sim.driving.body import Body
+from antdrive.sim.driving.drive import follow
+from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.perceived_movers import GroundTruth
+from antdrive.sim.driving.perceived_movers import Given
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.driving.replanning import Replanning
 from antdrive.sim.driving.rules import Avoid
+from antdrive.sim.driving.senses import MoverSense
 from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.physics.engine import CHASSIS_AND_ANY, Engine
 from antdrive.worlds import Cruising, Disc, Route, Task, Trajectories, World
@@ -99,11 +101,13 @@ def table_of_movers(route: Route, rounds: int) -> None:
                 (f"{MOVERS} movers, not seen", full, moving),
                 (f"{MOVERS} movers, avoided", full, moving),
             ):
-                told = GroundTruth(motions, Perception(), 60)
-                avoid = Avoid(Avoidance(), told, OnePath(), task, robot, 60)
+                told, sense = Given(Perception(), 60, len(motions)), MoverSense(motions, Perception(), 60)
+                avoid = Avoid(Avoidance(), told, task, robot, 60)
                 started = time.process_time()
                 rules = [avoid] if name.endswith("avoided") else []
-                log = follow(engine, controller, tracked, task, limit=30, rules=rules)
+                log = follow(
+                    engine, controller, tracked, task, limit=30, rules=rules, movers=(sense, told) if rules else None
+                )
                 if turn:
                     costs.setdefault(name, []).append((time.process_time() - started) / (len(log.t) - 1) * 1e6)
     print("\nloop                     us/step   / no movers")
@@ -147,7 +151,14 @@ class Costs:
 
     def __init__(self) -> None:
         self.reset()
-        parts = ((drive, "_control_period"), (Bullet, "advance"), (Replanning, "replan"), (Exploration, "replan"))
+        parts = (
+            (Body, "observe"),
+            (Driver, "act"),
+            (Body, "step"),
+            (Bullet, "advance"),
+            (Replanning, "replan"),
+            (Exploration, "replan"),
+        )
         for owner, name in parts:
             setattr(owner, name, self._measured(getattr(owner, name), name))
 
@@ -169,9 +180,9 @@ class Costs:
     def each(self) -> tuple[float, float, float]:
         """Return the costs of a control period without the other two, of a physics step and of a replan [us]."""
         spent, calls = self._spent, self._calls
-        period = spent["_control_period"] - spent["advance"] - spent["replan"]
+        period = spent["observe"] + spent["act"] + spent["step"] - spent["advance"] - spent["replan"]
         physics, replans = spent["advance"] / (4 * calls["advance"]), spent["replan"] / max(calls["replan"], 1)
-        return 1e6 * period / calls["_control_period"], 1e6 * physics, 1e6 * replans
+        return 1e6 * period / calls["act"], 1e6 * physics, 1e6 * replans
 
 
 def table_of_crowds(rounds: int, most: int) -> None:

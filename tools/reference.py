@@ -355,10 +355,9 @@ def composition() -> list[str]:
 
     def row(kind: str) -> Row:
         world, name, settings = kinds[kind]
-        parts = compose(Scenario.of(world, name, **settings))
-        scan = getattr(parts.scan, "__self__", None)
-        rules = ", ".join(code(type(rule).__name__) for rule in parts.rules)
-        return kind, *map(_class, (parts.localiser, scan, parts.guide)), rules
+        sensors, guide, mind = compose(Scenario.of(world, name, **settings))
+        rules = ", ".join(code(type(rule).__name__) for rule in mind.rules)
+        return kind, *map(_class, (sensors.localiser, mind.scans, guide)), rules
 
     return table("drive, localiser, scans, guide, rules in order", map(row, kinds))
 

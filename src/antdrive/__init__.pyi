@@ -31,6 +31,7 @@ from .sim.log.metrics import measure as measure
 from .sim.log.outcome import Outcome as Outcome
 from .sim.log.rollout import Rollout as Rollout
 from .sim.pipeline import Run as Run
+from .sim.pipeline import Session as Session
 from .sim.pipeline import plan as plan
 from .sim.pipeline import run as run
 from .sim.scenario import Scenario as Scenario

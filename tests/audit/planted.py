@@ -111,10 +111,10 @@ def controller(**factors: float) -> Callable[[], None]:
 
 
 def less_inflation() -> None:
-    from antdrive.sim.driving import routes
+    from antdrive.sim.driving import route_planner
 
-    rasterise = routes.rasterise
-    routes.rasterise = lambda world, cell, inflate: rasterise(world, cell, inflate - 0.02)
+    rasterise = route_planner.rasterise
+    route_planner.rasterise = lambda world, cell, inflate: rasterise(world, cell, inflate - 0.02)
 
 
 def wider_track() -> None:

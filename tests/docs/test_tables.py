@@ -17,7 +17,7 @@ from antdrive.runs.campaigns.rows import GRID, RESULT
 from antdrive.runs.campaigns.store import read_manifest
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.suite import ScenarioEntry, load_suite, suite_schema
-from antdrive.sim.driving.rules import EXPLORING_LIMITERS
+from antdrive.sim.driving.parts import EXPLORING_LIMITERS
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.record import MarginRecord, SensingRecord
 from antdrive.sim.log.rollout import ARRAYS, SENSED

@@ -5,13 +5,9 @@ from __future__ import annotations
 import contextlib
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from antdrive.base.errors import input_error
 from antdrive.base.guarded import OverLimit, UserCode, error_text, place
-
-if TYPE_CHECKING:
-    from antdrive.planners.plan import Planner
 
 
 class PlannerError(RuntimeError):
@@ -31,7 +27,7 @@ class PlannerError(RuntimeError):
         return type(self), (self.planner, self.problem)
 
 
-def planner_errors(planner: Planner, name: str = "") -> contextlib.AbstractContextManager[None]:
+def planner_errors(planner: object, name: str = "") -> contextlib.AbstractContextManager[None]:
     """Return a block for a planner's code that turns exceptions into `PlannerError`, except `InputError`, Ctrl-C and SIGTERM.
 
     Errors have the planner's name; without one, its class.
@@ -48,12 +44,12 @@ def planner_errors(planner: Planner, name: str = "") -> contextlib.AbstractConte
     return UserCode(who, error_of, (PlannerError,), own)
 
 
-def is_built_in(planner: Planner) -> bool:
+def is_built_in(planner: object) -> bool:
     """Return whether a planner's class is antdrive's."""
     return type(planner).__module__.startswith("antdrive.")
 
 
-def place_of(planner: Planner, error: BaseException | None = None) -> str:
+def place_of(planner: object, error: BaseException | None = None) -> str:
     """Return the file and line of the planner's module that raised the error; without an error, of its `plan`."""
     kind = type(planner)
     home = getattr(sys.modules.get(kind.__module__), "__file__", None)

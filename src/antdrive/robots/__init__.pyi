@@ -3,13 +3,14 @@ from .clearance import outline_of as outline_of
 from .clearance import overlap_at as overlap_at
 from .control.avoidance import Avoidance as Avoidance
 from .control.avoidance import AvoidanceState as AvoidanceState
+from .control.observation import Briefing as Briefing
+from .control.observation import Observation as Observation
 from .control.pursuit import LIMITERS as LIMITERS
 from .control.pursuit import PurePursuit as PurePursuit
 from .control.pursuit import PursuitState as PursuitState
 from .control.pursuit import TrackedPath as TrackedPath
 from .control.pursuit import Twist as Twist
 from .lidar import Lidar as Lidar
-from .noise import NoiseModel as NoiseModel
 from .robot_file import list_robots as list_robots
 from .robot_file import load_robot as load_robot
 from .robot_file import robot_schema as robot_schema

@@ -9,6 +9,7 @@ from .log.record import DriveRecord as DriveRecord
 from .log.rollout import Rollout as Rollout
 from .physics.engine import Engine as Engine
 from .pipeline import Run as Run
+from .pipeline import Session as Session
 from .pipeline import plan as plan
 from .pipeline import run as run
 from .policy import Perception as Perception

@@ -9,29 +9,26 @@ import dataclasses
 import math
 from typing import NamedTuple
 
-from antdrive.robots import LIMITERS, Avoidance
+from antdrive.base.records import unchecked_copy
+from antdrive.robots import Avoidance
+from antdrive.robots.control.observation import Briefing
 from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
-from antdrive.sim.driving.drive import full_turn, no_scan
+from antdrive.sim.driving.driver import Driver, full_turn
 from antdrive.sim.driving.exploring import Exploration
+from antdrive.sim.driving.guide import RouteGuide, Rule
 from antdrive.sim.driving.habits import Habits
-from antdrive.sim.driving.localising import localiser_of
+from antdrive.sim.driving.localising import Exact
+from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import Localiser, Logs, RouteGuide, Rule, Scanning
-from antdrive.sim.driving.perceived_movers import GroundTruth, PerceivedMovers, Tracked
+from antdrive.sim.driving.perceived_movers import Given, PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
-from antdrive.sim.driving.routes import OneRoute, RoutePlanner
-from antdrive.sim.driving.rules import (
-    EXPLORING_LIMITERS,
-    GOAL_SHARE,
-    Avoid,
-    KeepToSchedule,
-    Pursuit,
-    SlowAtCorners,
-    TurnToScan,
-)
+from antdrive.sim.driving.route_planner import RoutePlanner
+from antdrive.sim.driving.routes import OneRoute
+from antdrive.sim.driving.rules import GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, SlowAtCorners, TurnToScan
+from antdrive.sim.driving.senses import MoverSense, Senses, SimulatedLidar, positioning
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import MoverDetector, MoverTracking, SimulatedLidar, Survey
+from antdrive.sim.driving.survey import MoverDetector, Survey, turning_room
 from antdrive.sim.policy import Perception
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
@@ -43,41 +40,56 @@ BLIND_SHARE = (
 )
 
 
-class Parts(NamedTuple):
-    """Parts of a drive, and their entries in its record; None: unused."""
+class Sensors(NamedTuple):
+    """Sensors of a robot; None: unused."""
 
-    localiser: Localiser
-    scan: Scanning
-    guide: RouteGuide
-    rules: tuple[Rule, ...]  # in order of application
-    logs: tuple[Logs, ...]
-    limiters: tuple[str, ...]  # names of the rules that limit the speed
+    senses: Senses
+    localiser: Exact
+    lidar: SimulatedLidar | None
+    movers: MoverSense | None
 
 
-def compose(s: Scenario) -> Parts:
-    """Select the parts of a scenario's drive."""
+def compose(s: Scenario) -> tuple[Sensors, RouteGuide, Driver]:
+    """Create the sensors of a scenario's drive, and the guide and the mind, which know the briefing and observations."""
+    perception, trajectories, hz, start = perception_of(s), s.trajectories, s.control_hz, s.task.start
+    tracks_movers = perception.kind == "lidar"
+    levels = s.localisation, s.robot, s.noise, s.odometry, 1 / hz
+    senses, localiser = positioning(*levels, start, s.seed, mapless=s.mapless)
+    lidar = None
+    if s.mapless or tracks_movers:
+        lidar = SimulatedLidar.of(_lidar(s), s.driven_world, trajectories, seed=s.seed, noisy=s.noise > 0, hz=hz)
+    briefing = Briefing(
+        s.robot, start, s.task.goal, s.task.goal_tolerance, hz,
+        map=None if s.mapless else unchecked_copy(s.task.world, movers=()),
+        sight=lidar.first(start, turning_room(s.robot.radius)) if lidar and s.mapless else None,
+        matching=localiser.matched,
+        movers=len(trajectories),
+        motions=trajectories.positions if perception.kind == "motions" else None,
+    )  # fmt: skip
+    movers = MoverSense(trajectories, perception, hz) if s.moving and not tracks_movers else None
+    return Sensors(senses, localiser, lidar, movers), *_mind(s, briefing)
+
+
+def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
+    """Create the guide and the mind of a robot from a scenario's settings."""
     perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
-    tracks_movers, mapless = perception.kind == "lidar", s.mapless
-    moving = s.moving
-    start = s.task.start
-    localiser = localiser_of(s.localisation, s.robot, s.noise, s.odometry, 1 / hz, start, s.seed, mapless=mapless)
-    survey = _survey(s, tracks_movers, matching=localiser.matched) if mapless else None
+    tracks_movers, mapless, moving = perception.kind == "lidar", s.mapless, s.moving
+    survey = _survey(s, briefing, tracks_movers) if mapless else None
     scans = _mover_detector(s) if not mapless and tracks_movers else survey
     tracking = scans.tracking if scans else None
-    movers: PerceivedMovers = (
-        Tracked(tracking, perception, hz) if tracking else GroundTruth(s.trajectories, perception, hz)
-    )
+    given = Given(perception, hz, briefing.movers, briefing.motions)
+    movers: PerceivedMovers = Tracked(tracking, perception, hz) if tracking else given
     # A scan may be one scan period old, and commands are delayed.
     reaction = 1 / hz + (1 / _lidar(s).rate if scans else 0.0) + s.robot.noise.scaled(s.noise).delay
     rules: list[Rule] = [Pursuit(s.controller, full_turn(s.robot, hz))]
     guide: RouteGuide
     if survey:
         guide = exploration = _exploration(s, survey)
-        rules.append(TurnToScan(exploration, s.robot, hz))
+        rules.append(TurnToScan(s.robot, hz))
     else:
         guide = _guide(s, movers, moving)
     if s.timed:
-        rules.append(KeepToSchedule(guide, s.robot, hz))
+        rules.append(KeepToSchedule(s.robot, hz))
     if moving and avoidance is not None:
         if not mapless and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
             rules.append(SlowAtCorners(tracking, s.robot, hz, reaction))
@@ -89,20 +101,13 @@ def compose(s: Scenario) -> Parts:
         delay, losses = s.robot.noise.scaled(s.noise).delay, clearances_off_route(s.robot, s.controller, s.noise)
         rules.append(
             Avoid(
-                avoidance, movers, guide, s.task, s.robot, hz, goal_share=share, backwards=backwards, delay=delay,
+                avoidance, movers, s.task, s.robot, hz, goal_share=share, backwards=backwards, delay=delay,
                 losses=losses, habits=habits,
             )
         )  # fmt: skip
     if survey:
         rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_command))
-    return Parts(
-        localiser,
-        scans.scan if scans else no_scan,
-        guide,
-        tuple(rules),
-        tuple(part for part in (localiser, guide, scans, tracking) if part is not None),
-        limiters=EXPLORING_LIMITERS if survey else LIMITERS,
-    )
+    return guide, Driver(briefing, guide, rules, scans, given)
 
 
 def perception_of(s: Scenario) -> Perception:
@@ -171,10 +176,11 @@ def _exploration(s: Scenario, survey: Survey) -> Exploration:
     return Exploration(route_planner(s), survey, policy, ahead)
 
 
-def _survey(s: Scenario, tracks_movers: bool, *, matching: bool) -> Survey:
+def _survey(s: Scenario, known: Briefing, tracks_movers: bool) -> Survey:
     """Create the mapping of a mapless robot."""
     tracking = MoverTracking(_lidar(s), s.control_hz) if tracks_movers else None
-    return Survey.of(s.robot, s.task, _sensor(s), matching=matching, tracking=tracking)
+    matching = known.matching and (tracks_movers or not known.movers)  # those without tracks would shift the match
+    return Survey(known.robot, known.start, known.goal, known.hz, known.sight, matching=matching, tracking=tracking)
 
 
 def _mover_detector(s: Scenario) -> MoverDetector:
@@ -182,14 +188,9 @@ def _mover_detector(s: Scenario) -> MoverDetector:
     noise, lidar = s.robot.noise.scaled(s.noise), _lidar(s)
     errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
     ground = KnownGround(lidar, s.task.world, *errors)
-    return MoverDetector(_sensor(s), ground, MoverTracking(lidar, s.control_hz, *errors))
+    return MoverDetector(ground, MoverTracking(lidar, s.control_hz, *errors))
 
 
 def _lidar(s: Scenario) -> Lidar:
     assert s.robot.lidar is not None  # `Scenario` checks that the robot has a lidar
     return s.robot.lidar
-
-
-def _sensor(s: Scenario) -> SimulatedLidar:
-    """Simulate the lidar in the driven world."""
-    return SimulatedLidar.of(_lidar(s), s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)

@@ -1,4 +1,4 @@
-"""Facts of a finished run, each declared once; `result.json`, tables, baselines, reports and `verify` read `FACTS`.
+"""Finished runs and their facts, each declared once; `result.json`, tables, baselines, reports and `verify` read `FACTS`.
 
 To add a fact, add a line to `_TABLE`, or a metric to `antdrive.sim.log.metrics`, and explain it on the page of the
 files that hold it.
@@ -12,16 +12,25 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
+from antdrive.base.errors import FieldError
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import METRICS, measure, succeeded
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord, plain_value, settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
-    from antdrive.sim.pipeline import Run
+    from antdrive.planners import PlanResult
+    from antdrive.sim.scenario import Scenario
+    from antdrive.worlds import Grid
 
 
+ENDED_BY = {
+    "NO_PATH": Outcome.NO_PATH,
+    "STOPPED": Outcome.STOPPED,
+    "INVALID": Outcome.INVALID_PLAN,
+}
 #: Map, localisation and odometry of a log whose record leaves them out, as at their defaults.
 SENSED: Mapping[str, Any] = {name: SETTINGS[name].default for name in ("map", "localisation", "odometry")}
 #: The defaults of settings without a key of their own in the record.
@@ -54,6 +63,99 @@ class LoggedRun:
     def succeeded(self) -> bool:
         """Whether the robot stopped at the goal in time, certified free of contact."""
         return succeeded(self.rollout) and self.certificate.certified
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Result of a scenario: a plan and, if the planner found a path, a rollout with its certificate.
+
+    Attributes:
+        scenario: the scenario
+        grid: the planning grid
+        plan: the planner's answer
+        rollout: the log of the drive; None if planning found no path
+        certificate: the collision certificate of the log; None without a rollout
+    """
+
+    scenario: Scenario
+    grid: Grid
+    plan: PlanResult
+    rollout: Rollout | None = None
+    certificate: Certificate | None = None
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the run ended."""
+        if self.rollout is not None:
+            return self.rollout.outcome
+        return ENDED_BY[self.plan.status.name]
+
+    @property
+    def reason(self) -> str:
+        """Details beyond the outcome's sentence; may be empty."""
+        return self.rollout.record.reason if self.rollout is not None else self.plan.reason
+
+    @property
+    def certified(self) -> bool:
+        """Whether the drive is certified free of contact."""
+        return self.certificate is not None and self.certificate.certified
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the robot stopped at the goal in time, certified free of contact."""
+        return self.outcome is Outcome.SUCCEEDED and self.certified
+
+    @functools.cached_property
+    def logged(self) -> LoggedRun | None:
+        """The log with its certificate; None without a log."""
+        return None if self.rollout is None else LoggedRun(self.rollout, self.certificate or certify(self.rollout))
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Metrics of the drive by name, as defined in `METRICS`.
+
+        Raises:
+            ValueError: the run has no rollout, because planning found no path.
+        """
+        return dict(self._driven().metrics)
+
+    def metric(self, name: str) -> float:
+        """Return one metric of the drive, such as `run.metric("spl")`.
+
+        Raises:
+            ValueError: the run has no rollout, because planning found no path; or the metric is unknown.
+        """
+        log = self._driven()
+        if name not in METRICS:
+            raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
+        return log.metrics[name]
+
+    def _driven(self) -> LoggedRun:
+        if self.logged is None:
+            reason = f": {self.reason}" if self.reason else ""
+            raise ValueError(f"no rollout: planning ended with {self.outcome.key}{reason}")
+        return self.logged
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values, for JSON; `docs/reference/rollout-format.md` lists the keys."""
+        return result_of(self)
+
+    def __repr__(self) -> str:
+        s, log = self.scenario, self.rollout
+        reason = f" ({self.reason:.200})" if self.reason else ""
+        drive = f", {log.t[-1]:.1f} s" if log is not None else ""
+        proof = f", {self.certificate.statement}" if self.certificate is not None else ""
+        return f"<Run of {s.planner_label} in {s.task.world.name}: {self.outcome.value}{reason}{drive}{proof}>"
+
+    def _repr_html_(self) -> str:
+        from antdrive.sim.scenario import picture_of
+        from antdrive.worlds.svg import card
+
+        s, more = self.scenario, {"reason": self.reason} if self.reason else {}
+        if self.rollout is not None:
+            return self.rollout.card(certified="yes" if self.certified else "no", **more)
+        facts = {"planner": s.planner_label, "robot": s.robot.name, **more}
+        return card(picture_of(s), f"{s.task.world.name}: {self.outcome.value}", facts)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from antdrive.base.tables import table
 from antdrive.planners import PlanResult, PlanStatus, Query
 from antdrive.robots import PurePursuit, RobotSpec, list_robots, load_robot, outline_of, overlap_at
 from antdrive.robots.default_margin import default_margin
-from antdrive.sim.driving.routes import FINE
+from antdrive.sim.driving.route_planner import FINE
 from antdrive.sim.pipeline import plan
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Coverage, Grid, Task, load_task, rasterise

@@ -2,124 +2,186 @@
 
 from __future__ import annotations
 
-import functools
+import contextlib
+import math
 import time
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from antdrive.base.errors import FieldError
+from antdrive.base.guarded import error_text
 from antdrive.base.progress import progress_bar
-from antdrive.base.version import require_physics
-from antdrive.planners import PlanResult, PlanStatus
+from antdrive.base.version import require_physics, versions
+from antdrive.planners import PlanResult
+from antdrive.robots import Observation, TrackedPath, Twist
 from antdrive.sim.compose import compose
-from antdrive.sim.driving.drive import Driver, Progress, drive, ignore_progress
-from antdrive.sim.driving.plants import Bullet
-from antdrive.sim.facts import LoggedRun, result_of
-from antdrive.sim.log.certificate import Certificate, certify
-from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.driving.body import Body
+from antdrive.sim.driving.drive import Progress, drive, ignore_progress
+from antdrive.sim.driving.guide import Follow
+from antdrive.sim.driving.parts import SILENT, Ending, Note
+from antdrive.sim.driving.plants import Bullet, Drive
+from antdrive.sim.facts import ENDED_BY as ENDED_BY
+from antdrive.sim.facts import Run as Run
+from antdrive.sim.log.certificate import certify
+from antdrive.sim.log.contacts import attributed
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import ComponentRecord, DriveRecord, SmoothingRecord, TimesRecord, settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
-from antdrive.sim.recording import rollout_of
-from antdrive.sim.scenario import Scenario, picture_of, usual_time_limit
+from antdrive.sim.recording import configuration_of, plan_record
+from antdrive.sim.scenario import Scenario, usual_time_limit
+from antdrive.sim.written import Written
 from antdrive.worlds import Grid
-from antdrive.worlds.svg import card
 
-ENDED_BY = {
-    PlanStatus.NO_PATH: Outcome.NO_PATH,
-    PlanStatus.STOPPED: Outcome.STOPPED,
-    PlanStatus.INVALID: Outcome.INVALID_PLAN,
-}
+if TYPE_CHECKING:
+    from types import TracebackType
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """Result of a scenario: a plan and, if the planner found a path, a rollout with its certificate.
+class Session:
+    """Drive of a scenario that is observed and commanded from outside, for use in a `with` block.
+
+    It plans first, as `run` does, and opens physics if there is a path. One that is left early logs the outcome `STOPPED`.
+
+    >>> with Session(scenario) as drive:
+    ...     while not drive.ended:
+    ...         drive.step(*drive.mind.act(drive.observe()))
+    >>> drive.run.certificate
 
     Attributes:
-        scenario: the scenario
+        mind: the scenario's own mind: `step(*mind.act(observe()))` drives as `run` does
+        briefing: what the robot knows before the drive
         grid: the planning grid
         plan: the planner's answer
-        rollout: the log of the drive; None if planning found no path
-        certificate: the collision certificate of the log; None without a rollout
+        path: the planned path; None if planning found none
+        rollout: the log, once the `with` block is left; None without a path
+
+    Args:
+        s: the scenario
+        planned: as in `run`
+
+    Raises:
+        PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
     """
 
-    scenario: Scenario
-    grid: Grid
-    plan: PlanResult
-    rollout: Rollout | None = None
-    certificate: Certificate | None = None
+    def __init__(self, s: Scenario, planned: tuple[Grid, PlanResult] | None = None) -> None:
+        require_physics()
+        self._scenario, (self._sensors, guide, self.mind) = s, compose(s)
+        self.briefing = self.mind.briefing
+        self.grid, self.plan = guide.first() if planned is None else guide.accept(*planned)
+        self.path: TrackedPath | None = None
+        self._open = contextlib.ExitStack()
+        self._body: Body | None = None
+        self.rollout: Rollout | None = None
+        self._by_itself = True  # whether its mind has given every command
+        if self.plan.solved:
+            self._route, self.path = guide.route(self.grid, self.plan)
+            self.mind.way = Follow(self.path)
+
+    def __enter__(self) -> Session:
+        s = self._scenario
+        self._started = time.perf_counter()
+        if self.path is not None:
+            self._limit = s.time_limit or s.task.time_limit or usual_time_limit(self._route.length, s.robot, s.noise)
+            physics = Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories)
+            self._plant = Bullet(self._open.enter_context(physics), s.task.start, s.control_hz)
+            self._body = Body(self._plant, *self._sensors, hz=s.control_hz, limit=self._limit, task=s.task)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        with self._open:
+            if self._body is not None:
+                left = Ending(Outcome.STOPPED, error_text(error) if error else "left by the loop that commanded it")
+                ending = self.mind.with_reason(self._body.ended or left, self._body.tick)
+                self.rollout = self._logged(self._body, self._plant.finish(ending))
 
     @property
-    def outcome(self) -> Outcome:
-        """How the run ended."""
-        if self.rollout is not None:
-            return self.rollout.outcome
-        return ENDED_BY[self.plan.status]
+    def ended(self) -> Ending | None:
+        """How the drive ended; None while it goes on."""
+        return self._body.ended if self._body is not None else Ending(ENDED_BY[self.plan.status.name], self.plan.reason)
 
     @property
-    def reason(self) -> str:
-        """Details beyond the outcome's sentence; may be empty."""
-        return self.rollout.record.reason if self.rollout is not None else self.plan.reason
+    def run(self) -> Run:
+        """The result, with its log and certificate, once the `with` block is left."""
+        log = self.rollout
+        return Run(self._scenario, self.grid, self.plan, log, None if log is None else certify(log))
 
-    @property
-    def certified(self) -> bool:
-        """Whether the drive is certified free of contact."""
-        return self.certificate is not None and self.certificate.certified
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether the robot stopped at the goal in time, certified free of contact."""
-        return self.outcome is Outcome.SUCCEEDED and self.certified
-
-    @functools.cached_property
-    def logged(self) -> LoggedRun | None:
-        """The log with its certificate; None without a log."""
-        return None if self.rollout is None else LoggedRun(self.rollout, self.certificate or certify(self.rollout))
-
-    @property
-    def metrics(self) -> dict[str, float]:
-        """Metrics of the drive by name, as defined in `METRICS`.
+    def observe(self) -> Observation:
+        """Return what the robot observes in this control period.
 
         Raises:
-            ValueError: the run has no rollout, because planning found no path.
+            FieldError: there is no drive.
         """
-        return dict(self._driven().metrics)
+        return self._driving("observe").observe()
 
-    def metric(self, name: str) -> float:
-        """Return one metric of the drive, such as `run.metric("spl")`.
+    def step(self, command: Twist | None, note: Note = SILENT) -> None:
+        """Drive for one control period; without a command, or at the goal, the drive ends where the robot stands.
+
+        Args:
+            command: speed [m/s] and yaw rate [rad/s]
+            note: what a mind tells of its command
 
         Raises:
-            ValueError: the run has no rollout, because planning found no path; or the metric is unknown.
+            FieldError: the command is not two finite numbers, or there is no drive.
         """
-        log = self._driven()
-        if name not in METRICS:
-            raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
-        return log.metrics[name]
+        if note is SILENT:
+            self._by_itself, command = False, command if command is None else Twist(*_finite(command))
+        self._driving("step").step(command, note)
 
-    def _driven(self) -> LoggedRun:
-        if self.logged is None:
-            reason = f": {self.reason}" if self.reason else ""
-            raise ValueError(f"no rollout: planning ended with {self.outcome.key}{reason}")
-        return self.logged
+    def _driving(self, call: str) -> Body:
+        if self._body is None:
+            raise FieldError(call, f"there is no path: {self.plan.reason}" if self.path is None else "use `with`")
+        if self._body.ended is not None or self.rollout is not None:
+            raise FieldError(call, "the drive has ended")
+        return self._body
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, for JSON; `docs/reference/rollout-format.md` lists the keys."""
-        return result_of(self)
+    def _logged(self, body: Body, log: Drive) -> Rollout:
+        """Assemble the log."""
+        s, mind, per_tick = self._scenario, self.mind, self._plant.per_tick
+        guide, facts = mind.guide, configuration_of(s, self.grid, self.plan)
+        if not self._by_itself:
+            facts["controller"] = ComponentRecord(name=Session.__name__, settings={})
+        drive_wall_s = time.perf_counter() - self._started
+        record = DriveRecord(
+            **facts,
+            plan=plan_record(s, guide.footprint_margin, self.grid, self.plan),
+            smoothing=SmoothingRecord(asked=s.smoothing, made=self._route.kind, note=self._route.note),
+            replans=tuple(guide.log),
+            limiters=mind.limiters,
+            margin_choice=s.chosen.record if s.chosen is not None else None,
+            inflate=s.inflate,
+            time_limit=self._limit,
+            footprint_margin=guide.footprint_margin,
+            outcome=log.outcome,
+            reason=log.reason,
+            physics=log.physics,
+            written=settings_of(Written.of(s).plain()),
+            versions=versions(),
+            times=TimesRecord(plan_s=self.plan.wall_s, drive_wall_s=drive_wall_s, replans_s=tuple(guide.walls)),
+        )
+        rows = {
+            name: array for name, array in vars(log).items() if isinstance(array, np.ndarray) and name != "actuated"
+        }
+        rows |= {"route": self._route.xy, "cells": self.plan.cells}
+        return attributed(Rollout(**rows | body.logged(log, per_tick) | mind.logged(log, per_tick), record=record))
 
-    def __repr__(self) -> str:
-        s, log = self.scenario, self.rollout
-        reason = f" ({self.reason:.200})" if self.reason else ""
-        drive = f", {log.t[-1]:.1f} s" if log is not None else ""
-        proof = f", {self.certificate.statement}" if self.certificate is not None else ""
-        return f"<Run of {s.planner_label} in {s.task.world.name}: {self.outcome.value}{reason}{drive}{proof}>"
 
-    def _repr_html_(self) -> str:
-        s, more = self.scenario, {"reason": self.reason} if self.reason else {}
-        if self.rollout is not None:
-            return self.rollout.card(certified="yes" if self.certified else "no", **more)
-        facts = {"planner": s.planner_label, "robot": s.robot.name, **more}
-        return card(picture_of(s), f"{s.task.world.name}: {self.outcome.value}", facts)
+def _finite(command: Sequence[float]) -> tuple[float, float]:
+    """Return a command's two numbers.
+
+    Raises:
+        FieldError: it has no two finite numbers.
+    """
+    try:
+        speed, yaw_rate = map(float, command)
+    except (TypeError, ValueError):
+        speed = yaw_rate = math.nan
+    if not (math.isfinite(speed) and math.isfinite(yaw_rate)):
+        raise FieldError("command", f"must be two finite numbers, a speed and a yaw rate, got {command!r:.60}")
+    return speed, yaw_rate
 
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
@@ -132,7 +194,7 @@ def plan(s: Scenario) -> tuple[Grid, PlanResult]:
     Raises:
         PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
     """
-    return compose(s).guide.first()
+    return compose(s)[1].first()
 
 
 def run(
@@ -161,17 +223,7 @@ def driven(
     s: Scenario, planned: tuple[Grid, PlanResult] | None = None, progress: Progress = ignore_progress
 ) -> tuple[Grid, PlanResult, Rollout | None]:
     """Plan and drive as `run` does; return the grid, the plan, and the log if there is a path."""
-    require_physics()
-    parts = compose(s)
-    grid, answer = parts.guide.first() if planned is None else parts.guide.accept(*planned)
-    if not answer.solved:
-        return grid, answer, None
-    route, path = parts.guide.route(grid, answer)
-    limit = s.time_limit or s.task.time_limit or usual_time_limit(route.length, s.robot, s.noise)
-    started = time.perf_counter()
-    driver = Driver(parts.guide, parts.rules, path, s.task, s.robot, s.control_hz)
-    with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories) as engine:
-        plant = Bullet(engine, s.task.start, s.control_hz)
-        ending = drive(plant, driver, parts.localiser, parts.scan, hz=s.control_hz, limit=limit, progress=progress)
-        log = plant.finish(ending)
-    return grid, answer, rollout_of(s, parts, grid, answer, route, log, limit, time.perf_counter() - started)
+    with Session(s, planned) as session:
+        if session._body is not None:
+            drive(session._body, session.mind, progress)
+    return session.grid, session.plan, session.rollout

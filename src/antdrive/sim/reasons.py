@@ -22,7 +22,7 @@ from antdrive.worlds.route import end_reach
 
 if TYPE_CHECKING:
     from antdrive.robots import RobotSpec
-    from antdrive.sim.driving.routes import RoutePlanner
+    from antdrive.sim.driving.route_planner import RoutePlanner
 
 CELLS = (0.5, 0.25, 0.1, 0.05, 0.025, 0.01)  # sides of finer cells to try [m]
 MARGINS = (0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.08, 0.06, 0.05, 0.04, 0.03, 0.02, 0.01)  # smaller margins to try [m]

@@ -1,67 +1,28 @@
-"""Recording: the rollout of a drive from its arrays, scenario and parts."""
+"""Recording: what a scenario and its plan add to the record of a drive."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from antdrive.base.caches import Keyed, cached
-from antdrive.base.version import versions
 from antdrive.planners import AStar, PlanResult, Query, Tangent
 from antdrive.sim.compose import avoidance_of, perception_of
-from antdrive.sim.driving.plants import Drive
-from antdrive.sim.driving.routes import by_contents, grid_of, outlined_grid_of
-from antdrive.sim.log.contacts import attributed
+from antdrive.sim.driving.route_planner import by_contents, grid_of, outlined_grid_of
 from antdrive.sim.log.record import (
     ComponentRecord,
-    DriveRecord,
     PerceptionRecord,
     PlanRecord,
-    SmoothingRecord,
-    TimesRecord,
     finite_or_none,
     free_radius,
     settings_of,
 )
-from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.streams import random_stream
-from antdrive.sim.written import Written
-from antdrive.worlds import Grid, Route, Task
+from antdrive.worlds import Grid, Task
 from antdrive.worlds.world import by_geometry
 
 if TYPE_CHECKING:
     from antdrive.robots import RobotSpec
-    from antdrive.sim.compose import Parts
     from antdrive.sim.scenario import Scenario
-
-
-def rollout_of(
-    s: Scenario, parts: Parts, grid: Grid, answer: PlanResult, route: Route, log: Drive, limit: float, wall: float
-) -> Rollout:
-    """Assemble the log of a scenario's drive, with its time limit [s] and its wall time [s]."""
-    record = DriveRecord(
-        **configuration_of(s, grid, answer),
-        plan=_plan_record(s, parts.guide.footprint_margin, grid, answer),
-        smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
-        replans=tuple(parts.guide.log),
-        limiters=parts.limiters,
-        margin_choice=s.chosen.record if s.chosen is not None else None,
-        inflate=s.inflate,
-        time_limit=limit,
-        footprint_margin=parts.guide.footprint_margin,
-        outcome=log.outcome,
-        reason=log.reason,
-        physics=log.physics,
-        written=settings_of(Written.of(s).plain()),
-        versions=versions(),
-        times=TimesRecord(plan_s=answer.wall_s, drive_wall_s=wall, replans_s=tuple(parts.guide.walls)),
-    )
-    driven = {name: array for name, array in vars(log).items() if isinstance(array, np.ndarray) and name != "actuated"}
-    arrays: dict[str, Any] = {**driven, "route": route.xy, "cells": answer.cells}
-    for part in parts.logs:
-        arrays |= part.logged(log, s.physics_hz // s.control_hz)
-    return attributed(Rollout(**arrays, record=record))
 
 
 def configuration_of(s: Scenario, grid: Grid, answer: PlanResult) -> dict[str, Any]:
@@ -91,7 +52,8 @@ def configuration_of(s: Scenario, grid: Grid, answer: PlanResult) -> dict[str, A
     }
 
 
-def _plan_record(s: Scenario, footprint_margin: float | None, grid: Grid, answer: PlanResult) -> PlanRecord:
+def plan_record(s: Scenario, footprint_margin: float | None, grid: Grid, answer: PlanResult) -> PlanRecord:
+    """Return a plan's figures, with the shortest path on its grid and among its discs."""
     grid_optimum, euclidean_optimum = optima_of(s.task, grid.cell, s.robot, s.planned_margin, footprint_margin)
     return PlanRecord(
         cost_m=finite_or_none(answer.cost),

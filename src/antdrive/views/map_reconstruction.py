@@ -9,7 +9,9 @@ import numpy.typing as npt
 
 from antdrive.base.plane import relative_frame
 from antdrive.base.types import Flags, Floats, Pose
-from antdrive.sim.driving.survey import MAP_CELL, RECENT, horizon_of, reset_ticks, turning_room
+from antdrive.sim.driving.mover_tracking import MAP_CELL
+from antdrive.sim.driving.senses import start_ground
+from antdrive.sim.driving.survey import RECENT, horizon_of, reset_ticks, turning_room
 from antdrive.sim.log.rollout import Rollout, estimates_of, ranges_of
 from antdrive.sim.log.sights import lidar_of, meet
 from antdrive.sim.log.timeline import Timeline
@@ -81,7 +83,8 @@ class MapReconstruction:
         horizon = horizon_of(tracks_movers=moving)
         seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon, goal=record.task.goal, moving=moving)
         movers = np.column_stack((self._rollout.movers[0], [mover.radius for mover in record.world.movers]))
-        seen.mark_free(pose[:2], turning_room(record.robot.radius), record.world, movers)
+        room = turning_room(record.robot.radius)
+        seen.mark_free(pose[:2], room, start_ground(record.world, pose[:2], room, movers))
         return seen
 
     def _insert(self, k: int) -> None:

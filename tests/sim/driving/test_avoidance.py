@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from antdrive.robots import LIMITERS, Avoidance
 from antdrive.sim import Outcome, Perception, Scenario, run
-from antdrive.sim.driving.perceived_movers import GroundTruth
 from antdrive.sim.log.record import PerceptionRecord
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World
 from tests.records import COARSE, changed
+from tests.sim.driving.ground_truth import GroundTruth
 
 HALL = World("hall", (0.0, 0.0, 9.0, 6.0))
 TASK = Task(HALL, (1.0, 3.0, 0.0), (8.0, 3.0), cell=0.25)

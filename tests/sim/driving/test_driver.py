@@ -14,32 +14,37 @@ from hypothesis import strategies as st
 
 from antdrive.base import FieldError
 from antdrive.planners import Query, load_planner, smooth
-from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, PursuitState, Twist, load_robot
+from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, Noise, PurePursuit, PursuitState, Twist, load_robot
+from antdrive.robots.control.observation import Briefing, Observation
+from antdrive.robots.noise import moved_by
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
 from antdrive.sim.driving.blockage import blocked_cells, covered_discs
-from antdrive.sim.driving.drive import STUCK_PROGRESS, STUCK_TIME, Driver, OnePath, StuckClock, drive, follow, full_turn
-from antdrive.sim.driving.localising import Exact, TruePose
-from antdrive.sim.driving.parts import Decider, Ending, Guide, Moment, Step
-from antdrive.sim.driving.perceived_movers import GroundTruth
+from antdrive.sim.driving.body import Body
+from antdrive.sim.driving.drive import drive, follow
+from antdrive.sim.driving.driver import Driver, full_turn
+from antdrive.sim.driving.guide import Follow, Guide, Moment, Schedule, Wait
+from antdrive.sim.driving.localising import Exact
+from antdrive.sim.driving.parts import SIGHT_LIMIT, SILENT, Ending, Note, Step, StuckClock
 from antdrive.sim.driving.plants import Bullet, Kinematic
 from antdrive.sim.driving.rules import (
     AVOIDING,
-    SIGHT_LIMIT,
     WAITING_SPEED,
     Avoid,
     KeepToSchedule,
     Pursuit,
-    Schedule,
     TurnToScan,
     braked,
     slow_down,
     stopping_time,
 )
+from antdrive.sim.driving.senses import NoisySenses, Senses
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.physics.engine import Engine, State
+from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME
+from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, rasterise
 from tests.records import changed
+from tests.sim.driving.ground_truth import GroundTruth
 
 HALL = World("hall", (0.0, 0.0, 9.0, 6.0), (Disc(4.5, 4.5, 0.5),))
 CRUISING = Cruising(radius=0.3, position=(7.0, 1.0), velocity=(0.0, 0.1))
@@ -56,12 +61,33 @@ def driver(robot, guide=None, *rules):
     controller = PurePursuit()
     tracked = controller.prepare(smooth(plan, grid, TASK), HALL, robot, 0.03, 1 / 60)
     pursuit = Pursuit(controller, full_turn(robot, 60))
-    return Driver(guide or OnePath(), (pursuit, *rules), tracked, TASK, robot, 60)
+    known = Briefing(robot, TASK.start, TASK.goal, TASK.goal_tolerance, 60, HALL)
+    made = Driver(known, guide or Guide(), (pursuit, *rules))
+    made.way = Follow(tracked)
+    return made
 
 
-def end_of(robot, tick, pose, state):
-    """How a control period ends the drive of a robot at an estimated pose; None if it goes on."""
-    return robot.arrives(tick, pose, state) or robot.decide(tick, pose, state)
+def seen(tick=0, pose=TASK.start, speed=0.0):
+    """What a robot without errors observes."""
+    return Observation(tick, tick / 60, pose, (), Twist(speed, 0.0))
+
+
+class Off(Senses):
+    """Senses that are off, and noted."""
+
+    def __init__(self, true, believed):
+        self.off, self.states = np.subtract(believed, true), []
+
+    def read(self, state):
+        self.states.append(state)
+        x, y = (state.pose[:2] + self.off).tolist()
+        return Twist(0.0, 0.0), (x, y, state.yaw)
+
+
+def standing(true, believed=None, periods=9):
+    """The body of a robot that stands at a true position and believes to be elsewhere."""
+    plant = Kinematic((*true, 0.0), 0.0, load_robot("turtlebot"))
+    return Body(plant, Off(true, believed or true), Exact(TASK.start, 1 / 60), hz=60, limit=periods / 60, task=TASK)
 
 
 def at(driving, arc):
@@ -103,9 +129,7 @@ def test_the_reason_names_the_stopping_constraint_where_it_held_the_robot_for_mo
 def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot):
     still = driver(turtlebot)
     ticks = 0
-    rest = State(*TASK.start, 0.0, 0.0)
-    while still.gives_up(rest) is None:
-        assert still.decide(ticks, TASK.start, rest) is None
+    while still.act(seen(ticks))[1].ending is None:
         ticks += 1
     assert ticks == pytest.approx(STUCK_TIME * 60, abs=2)
 
@@ -120,8 +144,8 @@ def test_a_schedule_limits_the_speed_to_what_is_due_soon(turtlebot):
     assert [schedule.late(4.0, arc) for arc in (1.49, 1.51)] == [True, False]
     slower = slow_down(Twist(0.6, 0.3), Twist(0.6, 0.3), 0.0, 0.12)
     assert slower == pytest.approx((0.48, 0.24))
-    rule = KeepToSchedule(SimpleNamespace(schedule=schedule), replace(turtlebot, max_acceleration=1.2), 60)
-    now = SimpleNamespace(tick=120, before=Step(Twist(0.6, 0.0)))
+    rule = KeepToSchedule(replace(turtlebot, max_acceleration=1.2), 60)
+    now = SimpleNamespace(tick=120, way=Follow(None, schedule), before=Step(Twist(0.6, 0.0)))
     kept = rule.apply(now, Step(Twist(0.6, 0.3), PursuitState(arc=1.0)))
     assert kept.command == pytest.approx((0.58, 0.29))
     assert (kept.speed_limit, kept.waits) == (pytest.approx(0.5), False)
@@ -130,28 +154,32 @@ def test_a_schedule_limits_the_speed_to_what_is_due_soon(turtlebot):
 
 def test_a_robot_brakes_for_a_scan_turn_and_where_it_is_lost(turtlebot):
     goes = Step(Twist(0.5, 0.1), PursuitState())
-    now = SimpleNamespace(pose=TASK.start, before=goes)
-    for turn, lost in ((object(), False), (None, True), (None, False)):
-        found = TurnToScan(SimpleNamespace(scan_turn=turn, lost=lost), turtlebot, 60).apply(now, goes)
-        assert found.command == (goes.command if not (turn or lost) else braked(goes.command, turtlebot, 60))
+    braking = braked(goes.command, turtlebot, 60)
+    for way, command in (
+        (Wait(None, scan_turn=object()), braking),
+        (Wait(None), braking),
+        (Follow(None), goes.command),
+    ):
+        now = SimpleNamespace(pose=TASK.start, before=goes, way=way)
+        assert TurnToScan(turtlebot, 60).apply(now, goes).command == command
 
 
 def test_progress_is_a_fraction_of_the_route(turtlebot):
     half = driver(turtlebot)
-    assert at(half, half.path.length / 2).fraction == pytest.approx(0.5)
+    assert at(half, half.way.path.length / 2).fraction == pytest.approx(0.5)
 
 
 def test_turns_on_the_spot_add_the_time_of_a_full_turn_to_the_stuck_time(turtlebot):
-    turning, rest = driver(turtlebot), State(*TASK.start, 0.0, 0.0)
+    turning = driver(turtlebot)
     whole = full_turn(turtlebot, 60)
     assert whole == round(2 * math.pi / 3.14 * 60)
     for turned, gives_up in ((STUCK_TIME * 60 + whole - 1, False), (STUCK_TIME * 60 + whole, True)):
         turning._clock = StuckClock(turning=int(turned))
-        assert (turning.gives_up(rest) is not None) == gives_up
+        assert (turning._gives_up() is not None) == gives_up
 
 
 def test_only_a_robot_that_did_not_get_there_reports_what_its_guide_noted(turtlebot):
-    noting = OnePath()
+    noting = Guide()
     noting.failure_note = "no route at t = {} s".format
     noted = driver(turtlebot, noting)
     for outcome in Outcome:
@@ -177,10 +205,8 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
     x, y = TASK.goal
     for distance, outcome in ((0.0, Outcome.SUCCEEDED), (0.3, Outcome.STUCK)):
         at_end = driver(turtlebot)
-        at(at_end, at_end.path.length)
-        ending = None
-        for tick in range(9):  # the command comes to rest first
-            ending = ending or end_of(at_end, tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))
+        at(at_end, at_end.way.path.length)
+        ending = drive(standing((x, y - distance), (x, y)), at_end)  # the command comes to rest first
         assert ending.outcome is outcome
         lost = (
             "the robot believed that it was at the goal, 0.00 m from it, but was 0.300 m from it "
@@ -192,8 +218,9 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
 def test_a_robot_that_knows_where_it_is_is_told_how_far_from_the_goal_its_route_ends(turtlebot):
     x, y = TASK.goal
     for off in (-0.3, 0.4):  # what it believes lies outside the tolerance, too
-        ending = driver(turtlebot)._arrival((x, y + off, 0.0), State(x, y - 0.3, 0.0, 0.0, 0.0))
-        assert ending.reason == "the route ends here, 0.300 m from the goal; the tolerance is 0.25 m"
+        body = standing((x, y - 0.3), (x, y + off))
+        body.step(None)
+        assert body.ended.reason == "the route ends here, 0.300 m from the goal; the tolerance is 0.25 m"
 
 
 def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_holds_its_speed(turtlebot):
@@ -204,12 +231,11 @@ def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_ho
     nobody = GroundTruth(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
     sight = StoppingConstraint(None, turtlebot, 60, 0.1, lambda *_: None)
     sight.limit = lambda *_: (Twist(0.005, 0.0), True)
-    robot = driver(turtlebot, None, Avoid(calm, nobody, OnePath(), TASK, turtlebot, 60), sight)
-    at_goal = (*TASK.goal, 0.0)
-    at(robot, robot.path.length - 0.5)
-    endings = [end_of(robot, tick, at_goal, State(*at_goal, 0.0, 0.0)) for tick in range(2)]
+    robot = driver(turtlebot, None, Avoid(calm, nobody, TASK, turtlebot, 60), sight)
+    body = standing(TASK.goal)
+    assert drive(body, at(robot, robot.way.path.length - 0.5)).outcome is Outcome.SUCCEEDED
     assert robot.step.pursuit.limiter != LIMITERS.index("avoid")
-    assert [ending and ending.outcome for ending in endings] == [None, Outcome.SUCCEEDED]
+    assert body.tick == 1
 
 
 def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, turtlebot, monkeypatch):
@@ -226,9 +252,8 @@ def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, tu
 
         noted = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
         monkeypatch.setattr("antdrive.sim.compose.avoidance_of", lambda _, noted=noted: noted)
-        rule = next(rule for rule in compose(unknown).rules if type(rule) is Avoid)
-        still = State(*TASK.start, 0.0, 0.0)
-        rule.apply(Moment(0, TASK.start, still, driver(robot).path, Step(), StuckClock()), Step())
+        rule = next(rule for rule in compose(unknown)[2].rules if type(rule) is Avoid)
+        rule.apply(Moment(seen(), driver(robot).way, Step(), StuckClock()), Step())
         slow = robot is jackal and perception.kind == "lidar"
         assert asked == [BLIND_SHARE * robot.max_speed if slow else math.inf]
 
@@ -236,33 +261,28 @@ def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, tu
 class OneReplan(Guide):
     """A guide that replans once, back along the path that it is given."""
 
-    def __init__(self):
-        self.log, self.path = [], None
+    way = None
 
-    def trigger(self, tick, *_):
-        return "now" if tick == 1 else ""
-
-    def replan(self, *_):
-        return self.path
+    def path(self, now, *, at_end=False):
+        return self.way if now.tick == 1 else now.way
 
 
 def test_a_replan_starts_its_route_from_the_beginning(turtlebot):
     monitor = OneReplan()
     robot = driver(turtlebot, monitor)
-    monitor.path = driver(turtlebot).path
-    robot.decide(0, (3.0, 3.0, 0.0), State(3.0, 3.0, 0.0, 0.5, 0.0))
-    old = robot.path
+    monitor.way = driver(turtlebot).way
+    robot.act(seen(0, (3.0, 3.0, 0.0), 0.5))
+    old = robot.way
     assert robot.step.pursuit.arc > 0
-    robot.decide(1, TASK.start, State(*TASK.start, 0.5, 0.0))
-    assert robot.path is monitor.path is not old
+    robot.act(seen(1, speed=0.5))
+    assert robot.way is monitor.way is not old
     assert robot.step.pursuit.arc == pytest.approx(0.0, abs=0.02)
 
 
 def test_the_first_command_accelerates_within_the_robots_limit(turtlebot):
     first = driver(turtlebot)
-    first.decide(0, TASK.start, State(*TASK.start, 0.0, 0.0))
-    assert Twist(0.0, 0.0) != first.step.command
-    assert 0 < first.step.command.speed <= turtlebot.max_acceleration / 60 + 1e-12
+    command, _ = first.act(seen())
+    assert 0 < command.speed <= turtlebot.max_acceleration / 60 + 1e-12
 
 
 @given(st.lists(st.tuples(st.floats(0.5, 8.5), st.floats(0.5, 5.5), st.floats(0.05, 1.0)), max_size=5))
@@ -316,7 +336,7 @@ def test_a_robot_that_brakes_stops_at_the_goal_if_both_ends_of_its_way_are_there
     assert TASK.goal_tolerance == 0.25
     for yaw, pose in ((0.0, (x - before, y, 0.0)), (np.pi / 2, (x, y - before, np.pi / 2))):
         nobody = GroundTruth(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
-        rule = Avoid(Avoidance(), nobody, OnePath(), TASK, turtlebot, 60)
+        rule = Avoid(Avoidance(), nobody, TASK, turtlebot, 60)
         assert rule._stops_at_goal(pose, Twist(speed, 0.0)) is stops, yaw
 
 
@@ -342,30 +362,20 @@ def test_a_robot_that_gives_way_is_not_stuck(turtlebot):
         step=0.1,
         avoid=lambda *_, **__: (Twist(0.0, 0.0), True, AvoidanceState()),
     )
-    waits = driver(turtlebot, None, Avoid(cautious, nobody, OnePath(), TASK, turtlebot, 60))
-    rest = State(*TASK.start, 0.0, 0.0)
+    waits = driver(turtlebot, None, Avoid(cautious, nobody, TASK, turtlebot, 60))
     for tick in range(round(STUCK_TIME * 60) + 20):
-        assert waits.decide(tick, TASK.start, rest) is None
-    assert waits.step.pursuit.limiter == AVOIDING
-    assert waits.gives_up(rest) is None
+        assert waits.act(seen(tick)) == ((0.0, 0.0), Note(TASK.start, AVOIDING))
 
 
 class Watcher(Guide):
-    """Guide that notes waiting, and replans after a missed goal."""
-
-    may_wait = True
+    """Guide that notes waiting, and waits after a missed goal."""
 
     def __init__(self):
-        self.log = []
-        self.waiting = []
-        self.misses = []
+        self.waiting, self.misses = [], []
 
-    def trigger(self, tick, pose, waiting, *_):
-        self.waiting.append(waiting)
-        return ""
-
-    def missed(self, tick, pose):
-        self.misses.append(pose)
+    def path(self, now, *, at_end=False):
+        (self.misses if at_end else self.waiting).append(now.waiting)
+        return now.way
 
 
 @pytest.mark.parametrize(
@@ -379,18 +389,21 @@ def test_a_robot_waits_if_it_stands_to_give_way(turtlebot, avoids, speed, waits)
     monitor = Watcher()
     robot = driver(turtlebot, monitor)
     robot.step = Step(avoids=avoids)
-    robot.decide(0, TASK.start, State(*TASK.start, speed, 0.0))
+    robot.act(seen(speed=speed))
     assert monitor.waiting == [waits]
 
 
-class EndsAt(Decider):
-    """Decides in one control period that it is stuck, and notes for which period the reason is asked."""
+class EndsAt:
+    """Gives up in one control period, and notes for which period the reason is asked."""
 
-    def __init__(self, tick):
-        self.step, self._tick, self.asked = Step(), tick, []
+    progress_periods, fraction = 6, 0.0
 
-    def decide(self, tick, pose, state):
-        return Ending(Outcome.STUCK) if tick == self._tick else None
+    def __init__(self, tick, command):
+        self._tick, self._command, self.asked = tick, command, []
+
+    def act(self, now):
+        ends = now.tick == self._tick
+        return (self._command, Note(ending=Ending(Outcome.STUCK))) if ends else (Twist(0.0, 0.0), SILENT)
 
     def with_reason(self, ending, tick):
         self.asked.append((ending.outcome, tick))
@@ -399,10 +412,13 @@ class EndsAt(Decider):
 
 def test_the_reason_is_that_of_the_period_in_which_the_drive_ends():
     for last, outcome, asked in ((3, Outcome.STUCK, 3), (0, Outcome.STUCK, 0), (99, Outcome.TIMED_OUT, 30)):
-        plant = Kinematic(TASK.start, lambda pose, twist: np.array([pose]))
-        decider = EndsAt(last)
-        assert drive(plant, decider, Exact(), hz=60, limit=0.5).outcome is outcome
-        assert decider.asked == [(outcome, asked)]
+        for command, steps in ((None, asked), (Twist(0.0, 0.0), min(asked + 1, 30))):
+            plant = Kinematic(TASK.start, 0.0, load_robot("turtlebot"))
+            mind = EndsAt(last, command)
+            body = Body(plant, Senses(), Exact(TASK.start, 1 / 60), hz=60, limit=0.5)
+            assert drive(body, mind).outcome is outcome
+            assert mind.asked == [(outcome, asked)]
+            assert len(plant.poses) == 1 + steps
 
 
 @pytest.mark.parametrize(("true", "outcome"), [(0.4, Outcome.STUCK), (0.1, Outcome.SUCCEEDED)])
@@ -410,28 +426,52 @@ def test_the_reason_is_that_of_the_period_in_which_the_drive_ends():
 def test_a_goal_missed_by_the_estimate_triggers_a_replan(turtlebot, off, knows, true, outcome):
     """It stands `true` from the goal, and estimates that it is `off` from it. What is true ends no drive for it."""
     monitor, (x, y) = Watcher(), TASK.goal
-    robot = driver(turtlebot, monitor)
-    endings = []
-    for tick in range(9):  # the command comes to rest first
-        robot.step = robot.step._replace(pursuit=PursuitState(arc=robot.path.length))
-        endings.append(end_of(robot, tick, (x - off, y, 0.0), State(x - true, y, 0.0, 0.0, 0.0)))
+    robot, body = driver(turtlebot, monitor), standing((x - true, y), (x - off, y))
+    while body.ended is None:  # the command comes to rest first
+        robot.step = robot.step._replace(pursuit=PursuitState(arc=robot.way.path.length))
+        body.step(*robot.act(body.observe()))
     assert bool(monitor.misses) is knows
-    assert any(ending is not None and ending.outcome is outcome for ending in endings) is not knows
+    assert body.ended.outcome is (Outcome.TIMED_OUT if knows else outcome)
+
+
+def test_a_robot_that_stands_at_the_goal_has_arrived_whatever_it_commands():
+    """It is observed once in a period. Before its first command it has not arrived."""
+    body = standing(TASK.goal)
+    for _ in range(2):
+        assert body.ended is None
+        assert body.observe() is body.observe()
+        body.step(Twist(0.0, 0.0))
+    assert body.ended == (Outcome.SUCCEEDED, "")
+    assert (body.tick, len(body._senses.states), len(body._plant.poses)) == (1, 2, 2)
 
 
 def test_a_path_is_followed_by_the_estimates_of_the_localiser(turtlebot):
     """At an estimate 0.5 m to the left of the robot, it turns right."""
-    beside = Exact()
-    beside.settle = lambda pose: (pose[0], pose[1] + 0.5, pose[2])
     with Engine(TASK.world, turtlebot) as engine:
-        log = follow(engine, PurePursuit(), driver(turtlebot).path, TASK, limit=1.0, localiser=beside)
+        log = follow(engine, PurePursuit(), driver(turtlebot).way.path, TASK, limit=1.0, senses=Off((0, 0), (0, 0.5)))
     assert log.pose[-1, 2] < -0.1
+
+
+def test_a_robot_steers_from_where_it_will_be_when_its_next_command_takes_effect(turtlebot):
+    """Three commands have not reached its motors yet: 0.1, 0.2 and 0.3 m/s."""
+    plant = Kinematic(TASK.start, 0.0, load_robot("turtlebot"))
+    delayed = NoisySenses(Noise(delay=0.05), turtlebot.track, 1 / 60, 0)
+    body = Body(plant, delayed, Exact(TASK.start, 1 / 60), hz=60, limit=1.0)
+    for speed in (0.1, 0.2, 0.3):
+        body.step(Twist(speed, 0.0))
+    now = body.observe()
+    assert now.pose == TASK.start
+    assert moved_by(now.pose, now.pending, 1 / 60) == pytest.approx((TASK.start[0] + 0.6 / 60, *TASK.start[1:]))
+    seen_by = []
+    robot = driver(turtlebot, None, SimpleNamespace(apply=lambda at, step: seen_by.append(at.pose) or step))
+    robot.act(now)
+    assert seen_by == [moved_by(now.pose, now.pending, 1 / 60)]
 
 
 def test_progress_is_reported_ten_times_a_second(turtlebot):
     told = []
     with Engine(TASK.world, turtlebot) as engine:
-        tracked = driver(turtlebot).path
+        tracked = driver(turtlebot).way.path
         log = follow(engine, PurePursuit(), tracked, TASK, limit=1.0, progress=told.append)
     assert len(log.t) == 241
     assert len(told) == 10
@@ -441,12 +481,13 @@ def test_progress_is_reported_ten_times_a_second(turtlebot):
 def test_the_first_row_is_at_rest_and_estimates_keep_their_error(turtlebot):
     with Engine(TASK.world, turtlebot) as engine:
         plant = Bullet(engine, TASK.start, 80)
-        x, y, yaw = plant.state.pose
-        localiser = TruePose(turtlebot.noise, turtlebot.track, 1 / 80, TASK.start, np.random.default_rng(0))
-        localiser.settle((x + 0.1, y - 0.2, yaw + 0.3 + 2 * np.pi))
-        plant.advance(Step(Twist(0.2, 0.1), PursuitState(limiter=2)), Twist(0.3, 0.4))
-        found = plant.finish(Ending(Outcome.TIMED_OUT))
-        logged = localiser.logged(found, plant.per_tick)
+        senses = Off((0, 0), (0.1, -0.2))
+        senses.noisy, senses.actuate = True, lambda command: Twist(0.3, 0.4)
+        body = Body(plant, senses, Exact(TASK.start, 1 / 80), hz=80, limit=1 / 80)
+        x, y, yaw = body.observe().pose
+        body.step(Twist(0.2, 0.1), Note((x, y, yaw + 0.3 + 2 * np.pi), 2))
+        found = plant.finish(body.ended)
+        logged = body.logged(found, plant.per_tick)
     np.testing.assert_array_equal(found.command, [(0.0, 0.0), *[(0.2, 0.1)] * 3])
     np.testing.assert_array_equal(logged["actuated"], [(0.0, 0.0), *[(0.3, 0.4)] * 3])
     np.testing.assert_array_equal(found.limiter, [0, 2, 2, 2])

@@ -12,19 +12,21 @@ from hypothesis import strategies as st
 
 from antdrive.planners import PlanResult, PlanStatus
 from antdrive.robots import PursuitState, Twist
+from antdrive.robots.control.observation import Briefing, FirstSight, Observation
 from antdrive.robots.default_margin import SQUEEZED, TURNABLE
 from antdrive.sim import Outcome, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, mapless_task
 from antdrive.sim.driving._kernels_hits import beside, check, near_polyline, point_at, surrounding
-from antdrive.sim.driving.drive import Driver
+from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import INTERVAL
+from antdrive.sim.driving.guide import Follow
+from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import IDLE_TIME, Recovery, ScanTurn
-from antdrive.sim.driving.routes import RoutePlanner, bounds_of
+from antdrive.sim.driving.route_planner import RoutePlanner, bounds_of
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import MoverTracking, SimulatedLidar, Survey, reset_ticks
+from antdrive.sim.driving.survey import Survey, reset_ticks
 from antdrive.sim.log.record import ReplanRecord
-from antdrive.sim.physics.engine import State
 from antdrive.sim.policy import Perception, Trigger
 from antdrive.sim.recorded import rebuilt
 from antdrive.sim.sensing import Scanner
@@ -79,7 +81,7 @@ def test_replans_see_the_grid_of_the_whole_map(jackal, planner, monkeypatch):
 
 
 def test_the_first_grid_does_not_follow_the_map(jackal):
-    guide = compose(scenario(jackal)).guide
+    guide = compose(scenario(jackal))[1]
     grid, _ = guide.first()
     free, moves = grid.free.copy(), grid.moves.copy()
     guide._routes.observed(World("more", bounds_of(grid), (Disc(2.0, 2.0, 0.5),)), grid.inflate - jackal.radius)
@@ -134,7 +136,7 @@ def turning_room(robot, side):
     away = robot.radius + side + 0.05
     post = Disc(3.0 + away * math.cos(corner), 2.0 + away * math.sin(corner), 0.05)
     world = World("room", (0.0, 0.0, 6.0, 6.0), (post,))
-    guide = compose(scenario(robot, Task(world, (3.0, 2.0, 0.0), (3.0, 5.0)), footprint="exact")).guide
+    guide = compose(scenario(robot, Task(world, (3.0, 2.0, 0.0), (3.0, 5.0)), footprint="exact"))[1]
     route = Route(np.array([(3.0, 2.0), (3.0, 5.0)]), kind="taut", turns=np.array([math.pi / 2, 0.0]))
     tracked = guide._prepare(route, world, side)
     command, state = Twist(0.0, 0.0), PursuitState()
@@ -151,7 +153,7 @@ def test_the_controller_makes_the_turns_of_plans_for_the_footprint(jackal):
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_plans_for_the_footprint_keep_less_margin_only_without_a_path(jackal, noise, monkeypatch):
     """Room for the controller's turns comes before none at all, and that before plans closer to scattered hits."""
-    guide, margins = compose(scenario(jackal, footprint="exact", noise=noise)).guide, []
+    guide, margins = compose(scenario(jackal, footprint="exact", noise=noise))[1], []
 
     def around(task, grid, avoided):
         margins.append(grid.turns.outline.reach - jackal.footprint.rounding)
@@ -167,7 +169,7 @@ def test_scattered_hits_do_not_close_a_passage_and_the_record_keeps_no_margin(ja
     half = jackal.footprint.half_width - 0.005
     posts = tuple(Disc(3.0, 2.025 + side * (half + 0.2 + 0.4 * k), 0.2) for side in (-1, 1) for k in range(6))
     world = World("passage", (0.0, 0.0, 6.0, 4.0), posts)
-    guide = compose(scenario(jackal, Task(world, (1.0, 2.025, 0.0), (5.0, 2.025)), footprint="exact")).guide
+    guide = compose(scenario(jackal, Task(world, (1.0, 2.025, 0.0), (5.0, 2.025)), footprint="exact"))[1]
     guide._known = lambda pose, bounds: replace(guide._task, world=world, start=pose)
     grid, plan = guide.plan((1.0, 2.025, 0.0))
     assert plan.solved
@@ -178,7 +180,7 @@ def test_scattered_hits_do_not_close_a_passage_and_the_record_keeps_no_margin(ja
 @pytest.mark.parametrize(("yaw", "margin"), [(math.pi / 2, 0.03), (0.0, 0.0)])
 def test_a_rotation_at_the_beginning_of_a_route_counts_as_length(jackal, yaw, margin, monkeypatch):
     """The way without margin leads to the right, and the other one up."""
-    guide = compose(scenario(jackal, margin=0.03)).guide
+    guide = compose(scenario(jackal, margin=0.03))[1]
 
     def around(task, grid, avoided):
         tight = grid.inflate < jackal.radius + 0.01
@@ -193,7 +195,7 @@ def test_a_rotation_at_the_beginning_of_a_route_counts_as_length(jackal, yaw, ma
 
 
 def test_rotations_count_as_length_and_are_begun_on_the_way_only_without_movers(jackal):
-    guide = compose(scenario(jackal, margin=0.03)).guide
+    guide = compose(scenario(jackal, margin=0.03))[1]
     grid, plan = guide.first()
     _, tracked = guide.route(grid, plan)
     away = (*TASK.start[:2], TASK.start[2] + math.pi)
@@ -219,7 +221,7 @@ class NoMovers:
     ],
 )
 def test_where_the_disc_does_not_fit_the_footprint_leads_on(jackal, pose, led, outlined, monkeypatch):
-    guide, found = compose(scenario(jackal)).guide, []
+    guide, found = compose(scenario(jackal))[1], []
 
     def around(task, grid, avoided):
         found.append(bool(grid.turns))
@@ -273,12 +275,14 @@ def test_the_map_is_reset_after_failed_plans(log):
 
 def own_map(log):
     """The map that the robot of a log had at last."""
-    survey = compose(rebuilt(log.record)).scan.__self__
-    resets = dict.fromkeys(reset_ticks(log.record), survey.reset)
+    sensors, _, mind = compose(rebuilt(log.record))
+    survey, resets = mind.scans, dict.fromkeys(reset_ticks(log.record), mind.scans.reset)
     for row in range(0, len(log.t), log.record.physics_hz // log.record.control_hz):
         tick = row * log.record.control_hz // log.record.physics_hz
         estimate = tuple(log.estimate[row].tolist()) if len(log.estimate) else tuple(log.pose[row].tolist())
-        survey.scan(tick, tuple(log.pose[row].tolist()), estimate)
+        ranges = sensors.lidar.scan(tick, tuple(log.pose[row].tolist()))
+        if ranges is not None:
+            survey.read(tick, estimate, ranges)
         resets.get(tick, lambda pose: None)(estimate)
     return survey.map
 
@@ -309,7 +313,7 @@ def test_without_noise_pose_fixes_are_true_poses(jackal):
 @pytest.mark.parametrize(("kind", "matches"), [("positions", False), ("lidar", True)])
 def test_scans_are_matched_among_movers_only_if_they_are_tracked(kind, matches, jackal):
     made = scenario(jackal, "people-crossing", localisation="fixes", perception=Perception(kind=kind))
-    survey = compose(made).scan.__self__
+    survey = compose(made)[2].scans
     assert (survey._matcher is not None) is matches
 
 
@@ -361,7 +365,7 @@ def test_colonies_plan_on_cells_that_leave_gaps_open(jackal, cell, short):
     """The gap leaves 0.12 m for the robot's middle: no row of cells of 0.3 m lies there, and the way round is long."""
     posts = tuple(Disc(3.0, y, 0.075) for y in (*np.linspace(0.05, 2.0, 14), *np.linspace(3.0, 3.9, 7)))
     task = replace(TASK, world=replace(ROOM, obstacles=posts), cell=0.3)
-    _, answer = compose(scenario(jackal, task, "mmas", cell=cell, noise=0.0)).guide.plan(task.start)
+    _, answer = compose(scenario(jackal, task, "mmas", cell=cell, noise=0.0))[1].plan(task.start)
     assert (answer.solved and answer.cost < 1.5 * 4.4) == short, answer.cost
 
 
@@ -395,7 +399,7 @@ def test_nothing_that_stands_is_touched_in_random_forests(robot, seed, request):
 
 def test_plans_that_failed_long_ago_are_no_reason(jackal):
     """The note is empty before the third failure in a row, and half a minute after it."""
-    exploration = compose(scenario(jackal, noise=0.0)).guide
+    exploration = compose(scenario(jackal, noise=0.0))[1]
     walls = tuple(Disc(0.8 + 0.5 * math.cos(a), 0.8 + 0.5 * math.sin(a), 0.1) for a in np.arange(0, 6.3, 0.2))
     closed = np.array([(disc.x, disc.y, disc.radius) for disc in walls])
     exploration.survey.map.discs = lambda bounds: closed
@@ -412,10 +416,13 @@ def test_plans_that_failed_long_ago_are_no_reason(jackal):
 def test_a_map_counts_the_scans_that_are_taken(jackal, rate, share):
     """At 60 control periods a second a lidar of 1000 Hz takes 60 scans, of which 12 are entered as a whole."""
     robot = changed(jackal, "lidar", rate=rate)
-    survey = compose(scenario(robot)).guide.survey
+    sensors, _, mind = compose(scenario(robot))
+    survey = mind.scans
     assert survey.map.share == share
-    for tick in range(1, 61):
-        survey.scan(tick, TASK.start, TASK.start)
+    for tick in range(61):
+        ranges = sensors.lidar.scan(tick, TASK.start)
+        if ranges is not None:
+            survey.read(tick, TASK.start, ranges)
     assert len(survey.scans) == pytest.approx(min(rate, 60), abs=1)
     assert survey.whole == pytest.approx(min(rate, 60) / share, abs=1)
     assert survey._recent == min(rate, 60)
@@ -423,9 +430,8 @@ def test_a_map_counts_the_scans_that_are_taken(jackal, rate, share):
 
 
 def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal):
-    sensor = SimulatedLidar(Scanner.of(jackal.lidar, ROOM), ROOM, None, None, 60)
-    survey = Survey(sensor, jackal, TASK.start, TASK.goal)
-    survey.scan(0, TASK.start, TASK.start)
+    sight = FirstSight(ROOM, Scanner.of(jackal.lidar, ROOM).scan(TASK.start))
+    survey = Survey(jackal, TASK.start, TASK.goal, 60, sight)
     caution = StoppingConstraint(survey, jackal, 60, 0.1, lambda tick, held: None)
     free = caution.limit(TASK.start, Twist(1.0, 0.0), Twist(1.0, 0.0))
     assert free == (Twist(1.0, 0.0), False)  # stops within 0.35 m, sees 2 m
@@ -440,7 +446,7 @@ def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal):
 
 @pytest.mark.parametrize("place", [(-9.0, 0.8), (0.8, 9.0), (12.0, -8.0)])
 def test_routes_begin_where_the_robot_believes_it_is_however_far_it_drifted(jackal, place):
-    grid, plan = compose(scenario(jackal)).guide.plan((*place, 0.0))
+    grid, plan = compose(scenario(jackal))[1].plan((*place, 0.0))
     assert plan.solved
     assert math.dist(grid.xy(plan.line)[0], place) <= grid.cell
 
@@ -509,15 +515,17 @@ def test_a_robot_without_a_path_at_the_end_of_its_route_keeps_searching_for_a_wh
     """It has backed off, stands 3 m from the goal, and its plans failed."""
     task = Task(World("hall", OPEN), HERE, (7.0, 4.0), goal_tolerance=0.25, cell=0.1)
     s = Scenario.of(task, "astar", jackal, map="none")
-    exploration = compose(s).guide
+    exploration = compose(s)[1]
     _, tracked = exploration.route(*exploration.first())
-    robot = Driver(exploration, (), tracked, task, jackal, 60)
+    robot = Driver(Briefing(jackal, task.start, task.goal, task.goal_tolerance, 60), exploration, ())
+    robot.way = Follow(tracked)
     asked = []
     exploration.replan = lambda tick, pose, trigger: asked.append(trigger)
     exploration.lost = lost
     robot.step = Step(pursuit=PursuitState(arc=tracked.length))
-    ending = robot._end_of_route(0, HERE, State(*HERE, 0.0, 0.0), Twist(0.0, 0.0))
-    assert (ending is None) == lost
+    exploration.trigger = lambda *_: ""
+    command, _ = robot.act(Observation(0, 0.0, HERE, (), Twist(0.0, 0.0)))
+    assert (command is not None) == lost
     assert asked == ([] if lost else ["missed the goal"])
 
 
@@ -658,7 +666,7 @@ def test_unknown_ground_is_distinguished_from_hits(jackal):
     """A post ahead was hit, and the ground behind it is unknown."""
     task = Task(World("hall", OPEN, (Disc(4.8, 4.0, 0.2),)), HERE, (7.0, 4.0), goal_tolerance=0.25, cell=0.1)
     s = Scenario.of(task, "astar", jackal, map="none")
-    exploration = compose(s).guide
+    exploration = compose(s)[1]
     survey, recovery = exploration.survey, exploration._recovery
     for twist, unseen in ((FORWARD, False), (Twist(-0.5, 0.0), True), (Twist(0.001, 1.0), False)):
         recovery.note_command(0.0, twist)

@@ -5,8 +5,8 @@ import pytest
 
 from antdrive.sim import Perception
 from antdrive.sim.driving.habits import Habits
-from antdrive.sim.driving.perceived_movers import GroundTruth
 from antdrive.worlds import Keyframed, Trajectories, World
+from tests.sim.driving.ground_truth import GroundTruth
 
 HZ, AHEAD = 20, np.arange(26) * 0.1
 CORNER = ((0.0, 1.0, 1.0), (4.0, 5.0, 1.0), (8.0, 5.0, 5.0))  # east at 1 m/s, then north

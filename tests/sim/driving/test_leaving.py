@@ -131,5 +131,5 @@ def test_the_first_motion_is_rehearsed_for_a_minute(turtlebot):
     cart = replace(turtlebot, footprint=Footprint.rectangle(0.6, 0.8))
     world = World("w", (0.0, 0.0, 6.0, 4.0))
     stays = SimpleNamespace(step=step)
-    assert cannot_leave(driver(turtlebot).path, stays, world, cart, (0.45, 2.0, 0.0), 2) == ""
+    assert cannot_leave(driver(turtlebot).way.path, stays, world, cart, (0.45, 2.0, 0.0), 2) == ""
     assert len(steps) == 2 * 60

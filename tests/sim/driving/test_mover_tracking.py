@@ -13,9 +13,9 @@ from antdrive.base.errors import FieldError
 from antdrive.robots import PurePursuit, load_robot
 from antdrive.sim import Outcome, Perception, Rollout, Scenario, run
 from antdrive.sim.compose import compose
+from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.perceived_movers import Tracked
 from antdrive.sim.driving.rules import SlowAtCorners
-from antdrive.sim.driving.survey import MoverTracking
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import PerceptionRecord
@@ -115,7 +115,7 @@ def test_a_robot_without_a_map_follows_movers_too(jackal):
 def test_the_map_reaches_farther_among_movers(jackal):
     told = scenario(jackal, map="none", perception=Perception(), unseen=())
     tracks_movers = replace(told, perception=LIDAR)
-    assert [compose(s).guide.survey.map.horizon for s in (told, tracks_movers)] == [10.0, 16.0]
+    assert [compose(s)[1].survey.map.horizon for s in (told, tracks_movers)] == [10.0, 16.0]
 
 
 def test_movers_are_tracked_in_an_empty_world(turtlebot):

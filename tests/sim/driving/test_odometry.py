@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.robots import load_robot
-from antdrive.robots.noise import NoiseModel
+from antdrive.robots import Twist, load_robot
 from antdrive.robots.spec import Noise
 from antdrive.sim import run
 from antdrive.sim.driving.odometry import odometry_of
+from antdrive.sim.driving.senses import NoisySenses
 from antdrive.sim.log.consistency import wheel_speeds
+from antdrive.sim.physics.engine import State
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +76,7 @@ def test_the_covariance_is_the_spread_of_the_simulated_errors(by_fixes):
 
 def test_encoders_and_odometry_are_exact_without_errors():
     robot = load_robot("turtlebot")
-    model = NoiseModel(Noise(), robot.track, 0.02, (0.0, 0.0, 0.0), np.random.default_rng(0))
-    model.estimate_pose((0.0, 0.0, 0.0), model.actuate(type(model.odometry)(0.4, 0.2)))
-    assert model.encoders == model.odometry == pytest.approx((0.4, 0.2))
+    senses = NoisySenses(Noise(), robot.track, 0.02, 0)
+    odometry, fix = senses.read(State(1.0, 2.0, 0.5, *senses.actuate(Twist(0.4, 0.2))))
+    assert senses.encoders == odometry == pytest.approx((0.4, 0.2))
+    assert fix == (1.0, 2.0, 0.5)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -22,13 +23,15 @@ from antdrive.planners import (
 from antdrive.robots import Footprint, Twist
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, certify, run
 from antdrive.sim.compose import compose, route_planner
+from antdrive.sim.driving.guide import MAX_LAG, Schedule
 from antdrive.sim.driving.replanning import CellByCell
-from antdrive.sim.driving.routes import outlined_grid_of
-from antdrive.sim.driving.rules import MAX_LAG, KeepToSchedule, Schedule, slow_down
+from antdrive.sim.driving.route_planner import outlined_grid_of
+from antdrive.sim.driving.rules import KeepToSchedule, slow_down
 from antdrive.sim.log.metrics import tracking_error_max_m
 from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
 from antdrive.worlds.world import by_geometry
 from tests.records import COARSE, changed
+from tests.sim.driving.ground_truth import GroundTruth
 
 # A wall with two gates; the path through the nearer gate is shorter.
 POSTS = tuple(Disc(4.0, y, 0.25) for y in np.arange(0.25, 6.0, 0.5) if not (2.2 < y < 3.8 or y > 5.0))
@@ -115,7 +118,7 @@ def test_a_robot_that_left_its_cell_returns_around_obstacles(turtlebot):
     """Avoiding movers has taken the robot to the other side of the wall; its own cell lies behind a post."""
     task = changed(TASK, "world", movers=(GATEKEEPER,))
     scenario = Scenario.of(task, "mmas-dstar", turtlebot, **COARSE)
-    monitor = compose(scenario).guide
+    monitor = compose(scenario)[1]
     assert isinstance(monitor, CellByCell)
     grid, answer = monitor.first()
     monitor.route(grid, answer)
@@ -189,7 +192,10 @@ ASIDE = Keyframed(radius=0.3, keyframes=((0.0, 7.0, 0.5), (100.0, 7.0, 0.51)), l
 def monitor_of(*movers, robot, planner="dstar-lite", **settings):
     task = changed(TASK, "world", movers=movers)
     policy = ReplanPolicy(**settings)
-    made = compose(Scenario.of(task, planner, robot, avoidance=None, replanning=policy)).guide
+    s = Scenario.of(task, planner, robot, avoidance=None, replanning=policy)
+    truth = GroundTruth(s.trajectories, s.known_perception, s.control_hz)
+    with mock.patch("antdrive.sim.compose.Given", return_value=truth):
+        made = compose(s)[1]
     return made, made.route(*made.first())[1]
 
 
@@ -281,10 +287,10 @@ def test_a_plan_in_time_has_a_schedule_among_movers_alone_with_or_without_replan
     moving = changed(TASK, "world", movers=(GATEKEEPER,))
     for task, scheduled in ((moving, True), (TASK, False)):
         for settings in ({"replanning": None}, {}, {"perception": Perception(kind="lidar")}):
-            parts = compose(Scenario.of(task, "sipp", jackal, margin=0.1, **settings))
-            parts.guide.route(*parts.guide.first())
-            assert (parts.guide.schedule is not None) is scheduled
-            assert any(isinstance(rule, KeepToSchedule) for rule in parts.rules) is scheduled
+            _, guide, mind = compose(Scenario.of(task, "sipp", jackal, margin=0.1, **settings))
+            guide.route(*guide.first())
+            assert (guide.schedule is not None) is scheduled
+            assert any(isinstance(rule, KeepToSchedule) for rule in mind.rules) is scheduled
 
 
 @given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))
@@ -411,7 +417,7 @@ def test_an_error_of_antdrive_around_a_replanner_is_not_the_planners(monkeypatch
     def broken(*_):
         raise KeyError("ours")
 
-    monkeypatch.setattr("antdrive.sim.driving.routes.closed_cells", broken)
+    monkeypatch.setattr("antdrive.sim.driving.route_planner.closed_cells", broken)
     with pytest.raises(KeyError, match="ours"):
         run(Scenario.of(MOVING, "dstar-lite", time_limit=10.0))
 
@@ -475,7 +481,7 @@ def test_plans_for_a_footprint_are_repaired_and_as_short_as_those_from_scratch(p
     repaired, scratch = route_planner(scenario), route_planner(replace(scenario, planner=load_planner("astar")))
     made = []
     monkeypatch.setattr(
-        "antdrive.sim.driving.routes.replanner_for", lambda *args: made.append(args) or replanner_for(*args)
+        "antdrive.sim.driving.route_planner.replanner_for", lambda *args: made.append(args) or replanner_for(*args)
     )
     repaired.mapless = not mapped
     for turn, discs in enumerate(((), (Disc(4.0, 3.0, 0.45),), (Disc(4.0, 3.0, 0.45), Disc(5.0, 4.0, 0.3)), ())):

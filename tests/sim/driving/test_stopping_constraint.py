@@ -10,10 +10,10 @@ import pytest
 from hypothesis import strategies as st
 
 from antdrive.robots import Footprint, Lidar, PursuitState, Twist, footprint_clearance, load_robot
-from antdrive.sim.driving.parts import Step
-from antdrive.sim.driving.rules import SIGHT_LIMIT
+from antdrive.robots.control.observation import FirstSight
+from antdrive.sim.driving.parts import SIGHT_LIMIT, Step
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
-from antdrive.sim.driving.survey import SimulatedLidar, Survey
+from antdrive.sim.driving.survey import Survey
 from antdrive.sim.sensing import Scanner
 from antdrive.worlds import Disc, World
 from tests.records import changed
@@ -45,14 +45,15 @@ def driven(robot, world, start, wanted, hz, held, *, told=None):
 
     `told` is the world of which it is told what stands around its start, by default the true one.
     """
-    sensor = SimulatedLidar(Scanner.of(robot.lidar, world), told or world, None, None, hz)
-    survey = Survey(sensor, robot, start, (start[0] + 2.0, start[1]))
+    scanner = Scanner.of(robot.lidar, world)
+    survey = Survey(robot, start, (start[0] + 2.0, start[1]), hz, FirstSight(told or world, scanner.scan(start)))
     caution = StoppingConstraint(survey, robot, hz, 1 / hz + 1 / robot.lidar.rate, lambda *noted: None)
     most, sharpest = robot.max_acceleration / hz, robot.max_yaw_acceleration / hz
     pose, last, poses = start, Twist(0.0, 0.0), []
     for tick in range(len(wanted) * held):
         want = wanted[tick // held]
-        survey.scan(tick, pose, pose)
+        if tick and robot.lidar.due(tick, hz):
+            survey.read(tick, pose, scanner.scan(pose))
         speed = min(max(want.speed, last.speed - most), last.speed + most)
         rate = min(max(want.yaw_rate, last.yaw_rate - sharpest), last.yaw_rate + sharpest)
         last = caution.limit(pose, last, Twist(speed, rate))[0]
@@ -212,10 +213,12 @@ def test_a_robot_that_resets_its_map_turns_over_no_known_post(beside):
     robot = changed(jackal, "lidar", field_of_view=math.pi)
     posts = tuple(Disc(2.88, 2.0 + side * beside, 0.03) for side in (-1, 1)) if beside else ()
     world, start, here = World("gate", (0.0, 0.0, 8.0, 4.0), posts), (1.5, 2.0, 0.0), (3.0, 2.0, 0.0)
-    survey = Survey(SimulatedLidar(Scanner.of(robot.lidar, world), world, None, None, 50), robot, start, (7.0, 2.0))
-    for tick in range(210):
+    scanner = Scanner.of(robot.lidar, world)
+    survey = Survey(robot, start, (7.0, 2.0), 50, FirstSight(world, scanner.scan(start)))
+    for tick in range(1, 210):
         x = min(3.0, 1.5 + 0.01 * tick)
-        survey.scan(tick, (x, 2.0, 0.0), (x, 2.0, 0.0))
+        if robot.lidar.due(tick, 50):
+            survey.read(tick, (x, 2.0, 0.0), scanner.scan((x, 2.0, 0.0)))
     known = survey.clear_turn(here, 1.0, math.pi)
     survey.reset(here)
     turn = survey.clear_turn(here, 1.0, math.pi)

@@ -23,11 +23,12 @@ from antdrive.sim.driving.movers_ahead import (
     Traffic,
     Zone,
 )
-from antdrive.sim.driving.perceived_movers import GroundTruth, Tracked
+from antdrive.sim.driving.perceived_movers import Tracked
 from antdrive.sim.policy import Trigger
 from antdrive.sim.sensing import TrackedMovers
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, import_dynabarn, rasterise
 from tests.records import COARSE, changed
+from tests.sim.driving.ground_truth import GroundTruth
 from tools.shared_data import DYNABARN
 
 HALL = World("hall", (0.0, 0.0, 16.0, 12.0))
@@ -355,7 +356,7 @@ def unknown(robot, planner="dstar-lite", **settings):
 @pytest.mark.parametrize("planner", ["dstar-lite", "astar", "tangent"])
 def test_plans_lead_round_busy_ground_and_off_movers(jackal, planner):
     """The first scan sees the hall; tracks that are told it then stand for movers."""
-    exploration = compose(unknown(jackal, planner)).guide
+    exploration = compose(unknown(jackal, planner))[1]
     movers = exploration._movers
     tracking = exploration.survey.tracking = Seen()
     movers._predictor.tracking = tracking
@@ -380,8 +381,8 @@ def test_plans_lead_round_busy_ground_and_off_movers(jackal, planner):
 
 
 def test_a_policy_may_leave_movers_to_local_avoidance(jackal):
-    assert compose(unknown(jackal, replanning=ReplanPolicy(around_movers=False))).guide._movers is None
-    assert compose(unknown(jackal, localisation="fixes", perception=Perception())).guide._movers is None
+    assert compose(unknown(jackal, replanning=ReplanPolicy(around_movers=False)))[1]._movers is None
+    assert compose(unknown(jackal, localisation="fixes", perception=Perception()))[1]._movers is None
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import strategies as st
 
 from antdrive.robots import Footprint, Lidar
+from antdrive.sim.driving.senses import start_ground
 from antdrive.sim.sensing import OccupancyMap, Scanner, clear_way, shape_of
 from antdrive.sim.sensing._kernels_mapping import SQUARE, begins
 from antdrive.worlds import Disc, World
@@ -252,6 +253,22 @@ def test_ground_on_which_something_stands_is_not_taken_as_free():
         px, py = taken.origin[0] + col * taken.cell + x, taken.origin[1] + row * taken.cell + y
         stands = (np.hypot(px - post[0], py - post[1]) <= post[2]).any() or (px < wall - 1e-9).any()
         assert taken.seen_free[row, col] != stands, (row, col)
+
+
+def test_a_robot_is_given_nothing_far_from_its_start():
+    """What it is given frees the same cells of its map as the whole world would."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        discs = tuple(Disc(*rng.uniform((-3, -3, 0.02), (3, 3, 0.6)).tolist()) for _ in range(12))
+        world = World("w", (*rng.uniform(-3.0, -0.1, 2).tolist(), *rng.uniform(0.1, 3.0, 2).tolist()), discs)
+        movers, (whole, near) = rng.uniform((-1, -1, 0.1), (1, 1, 0.3), (2, 3)), (OccupancyMap(EYE), OccupancyMap(EYE))
+        ground = start_ground(world, (0.0, 0.0), 0.3, movers)
+        everything = World("w", world.bounds, (*discs, *(Disc(*mover) for mover in movers.tolist())))
+        whole.mark_free((0.0, 0.0), 0.3, everything)
+        near.mark_free((0.0, 0.0), 0.3, ground)
+        assert np.array_equal(near.seen_free, whole.seen_free)
+        assert max(map(abs, ground.bounds)) <= 0.5
+        assert (np.hypot(*ground.discs[:, :2].T) - ground.discs[:, 2] <= 0.5).all()
 
 
 @pytest.mark.parametrize("place", [(0.31, -0.77), (9.2, -1.03), (40.0, 0.0)])

@@ -9,7 +9,8 @@ import pytest
 from antdrive.robots import Noise, Odometry, Twist
 from antdrive.robots.noise import SLIP_TIME
 from antdrive.robots.spec import SAMPLE_RATE
-from antdrive.sim.driving.localising import Exact, Fixes, Fused, localiser_of
+from antdrive.sim.driving.localising import Exact, Fixes, Fused, Reckoned
+from antdrive.sim.driving.senses import NoisySenses, positioning
 from antdrive.sim.physics.engine import State
 from antdrive.sim.sensing.pose_filter import PoseFilter
 
@@ -66,16 +67,16 @@ def fused_drive(robot, seed, rate, seconds=5.0):
     """The last error of the estimate of a robot that weaves, with its covariance."""
     hz, start = 60, (1.0, 2.0, 0.5)
     levels = dataclasses.replace(robot.noise, pose_rate=rate)
-    made = Fused(levels, robot.track, 1 / hz, start, seed, Odometry())
+    senses = NoisySenses(levels, robot.track, 1 / hz, seed, Odometry())
+    made = Fused(start, 1 / hz, levels, robot.track, Odometry())
     (x, y, yaw), twist = start, Twist(0.0, 0.0)
     for k in range(round(seconds * hz)):
-        estimate = made.sense(State(x, y, yaw, *twist))
-        made.settle(estimate)
-        twist = made.actuate(Twist(0.8, 1.2 * math.sin(0.05 * k)))
+        made.update(*senses.read(State(x, y, yaw, *twist)))
+        twist = senses.actuate(Twist(0.8, 1.2 * math.sin(0.05 * k)))
         middle = yaw + twist.yaw_rate / hz / 2
         x, y = x + twist.speed / hz * math.cos(middle), y + twist.speed / hz * math.sin(middle)
         yaw += twist.yaw_rate / hz
-    estimate = made.sense(State(x, y, yaw, *twist))
+    estimate = made.update(*senses.read(State(x, y, yaw, *twist)))
     return np.array(estimate) - (x, y, yaw), made.covariance
 
 
@@ -98,7 +99,7 @@ def test_exact_fixes_are_the_estimate_and_scans_do_not_move_it(jackal):
     assert np.abs(error).max() < 1e-5
     assert np.linalg.eigvalsh(covariance).min() > 0
     robot = dataclasses.replace(jackal, noise=exact)
-    assert not localiser_of("fixes", robot, 1.0, 1.0, 1 / 60, (0.0, 0.0, 0.0), 0, mapless=True).matched
+    assert not positioning("fixes", robot, 1.0, 1.0, 1 / 60, (0.0, 0.0, 0.0), 0, mapless=True)[1].matched
 
 
 @pytest.mark.parametrize(
@@ -107,12 +108,12 @@ def test_exact_fixes_are_the_estimate_and_scans_do_not_move_it(jackal):
         ("fixes", 1.0, True, Fused, True),
         ("fixes", 1.0, False, Fixes, False),
         ("fixes", 0.0, True, Exact, False),
-        ("odometry", 1.0, True, Fixes, False),
-        ("matching", 1.0, True, Fixes, True),
+        ("odometry", 1.0, True, Reckoned, False),
+        ("matching", 1.0, True, Reckoned, True),
+        ("true", 1.0, True, Exact, False),
     ],
 )
 def test_scans_correct_estimates_that_drift_or_jump(kind, noise, mapless, made, matched, jackal):
-    localiser = localiser_of(kind, jackal, noise, 1.0, 1 / 60, (0.0, 0.0, 0.0), 0, mapless=mapless)
-    assert isinstance(localiser, made)
-    assert isinstance(localiser, Fused) is (made is Fused)
+    _, localiser = positioning(kind, jackal, noise, 1.0, 1 / 60, (0.0, 0.0, 0.0), 0, mapless=mapless)
+    assert type(localiser) is made
     assert localiser.matched is matched

@@ -23,7 +23,7 @@ from antdrive.robots import PurePursuit, RobotSpec, outline_of, overlap_at
 from antdrive.robots.default_margin import LEAST, default_margin
 from antdrive.runs.campaigns.campaign import Campaign, RandomTasks, seeds_of
 from antdrive.runs.campaigns.job import NamedTask, PlannerVariant, TaskOrigin
-from antdrive.sim.driving.routes import FINE
+from antdrive.sim.driving.route_planner import FINE
 from antdrive.sim.forms import option_text, seed_list
 from antdrive.sim.log.record import canonical_hash, settings_of
 from antdrive.sim.written import Written, placed

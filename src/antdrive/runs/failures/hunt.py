@@ -15,21 +15,20 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from antdrive.base import Floats, Pose
+from antdrive.base import Floats
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import PlannerError
-from antdrive.robots import PurePursuit, TrackedPath, Twist, footprint_clearance
+from antdrive.robots import PursuitState, Twist, footprint_clearance
+from antdrive.robots.noise import moved_by
 from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.sim.compose import route_planner
-from antdrive.sim.driving.drive import drive
-from antdrive.sim.driving.localising import localiser_of
-from antdrive.sim.driving.parts import Decider, Ending, Step
+from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.plants import Kinematic
 from antdrive.sim.driving.routes import OneRoute
+from antdrive.sim.driving.senses import positioning
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.physics.engine import State
 from antdrive.sim.pipeline import plan
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Disc, Task, World
@@ -122,36 +121,19 @@ def rehearsed_clearance(s: Scenario) -> float:
         return math.inf
     known = dataclasses.replace(route_planner(s), task=s.task, smoothing=s.smoothing)
     route, path = OneRoute(known).route(grid, answer)
-    localiser = localiser_of("fixes", s.robot, s.noise, 1.0, 1 / s.control_hz, s.task.start, s.seed)
-    plant = Kinematic(s.task.start, lambda pose, twist: np.array([_moved(pose, twist, 1 / s.control_hz)]))
+    period = 1 / s.control_hz
+    measured = positioning("fixes", s.robot, s.noise, 1.0, period, s.task.start, s.seed)
+    plant = Kinematic(s.task.start, period, s.robot)
     limit = SETTLING + PATIENCE * route.length / s.robot.max_speed
-    drive(plant, Rehearsing(path, s.controller), localiser, hz=s.control_hz, limit=limit)
+    body = Body(plant, *measured, hz=s.control_hz, limit=limit)
+    command, state = Twist(0.0, 0.0), PursuitState()
+    while body.ended is None and not (
+        state.arc > path.length - path.goal_distance and abs(plant.state.speed) < STANDING
+    ):
+        now = body.observe()
+        command, state = s.controller.step(path, moved_by(now.pose, now.pending, period), command, state)
+        body.step(command)
     return float(footprint_clearance(s.driven_world, s.robot.footprint, plant.poses).min())
-
-
-class Rehearsing(Decider):
-    """Decider that follows a path with the controller alone until the robot stands at its end."""
-
-    def __init__(self, path: TrackedPath, controller: PurePursuit) -> None:
-        self.step = Step()
-        self._path, self._controller = path, controller
-
-    def decide(self, tick: int, pose: Pose, state: State) -> None:
-        """Set the controller's command."""
-        self.step = Step(*self._controller.step(self._path, pose, self.step.command, self.step.pursuit))
-
-    def gives_up(self, state: State) -> Ending | None:
-        """End the drive if the robot stands at the end of the path."""
-        there = self.step.pursuit.arc > self._path.length - self._path.goal_distance
-        return Ending(Outcome.SUCCEEDED) if there and abs(state.speed) < STANDING else None
-
-
-def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
-    """Return a pose after driving with a twist for a time [s]."""
-    x, y, yaw = pose
-    middle = yaw + twist.yaw_rate * time / 2
-    way = twist.speed * time
-    return x + way * math.cos(middle), y + way * math.sin(middle), math.remainder(yaw + twist.yaw_rate * time, math.tau)
 
 
 POINTS = 60  # of a line, equally spaced

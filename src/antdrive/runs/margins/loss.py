@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from antdrive.base.version import versions
 from antdrive.planners import PLANNERS, Query, smooth
 from antdrive.robots import RobotSpec, outline_of
 from antdrive.sim.driving.drive import follow
-from antdrive.sim.driving.localising import localiser_of
+from antdrive.sim.driving.senses import positioning
 from antdrive.sim.log.certificate import travel_between
 from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.outcome import Outcome
@@ -153,9 +153,10 @@ def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
     route = smooth(answer, grid, task, kind=c.smoothing)
     period, limit = 1 / c.control_hz, 30.0 + 10.0 * route.length / robot.max_speed
     path = c.controller.prepare(route, task.world, robot, margin, period, task.goal_tolerance, noise=c.noise)
-    localiser = localiser_of("fixes", robot, c.noise, 1.0, period, task.start, seed)
+    senses, localiser = positioning("fixes", robot, c.noise, 1.0, period, task.start, seed)
     with Engine(task.world, robot, physics_hz=c.physics_hz) as engine:
-        log = follow(engine, c.controller, path, task, limit=limit, control_hz=c.control_hz, localiser=localiser)
+        rates: dict[str, Any] = {"limit": limit, "control_hz": c.control_hz}
+        log = follow(engine, c.controller, path, task, **rates, senses=senses, localiser=localiser)
     if log.outcome is not Outcome.SUCCEEDED or log.physics:
         return Loss(math.inf, math.inf)
     disc = log.clearance if c.outlined else point_clearance(task.world, log.pose[:, :2]) - robot.radius

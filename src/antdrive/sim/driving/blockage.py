@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +26,6 @@ from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Task, rasterise
 from antdrive.worlds.world import PointWorld
-
-if TYPE_CHECKING:
-    from antdrive.sim.driving.movers_ahead import Zone
 
 STEP = 0.25  # longest time between predicted positions [s]
 MIN_RADIUS = 0.01  # smaller discs are omitted [m]
@@ -84,11 +81,13 @@ def blocked_cells(grid: Grid, discs: Sequence[Disc]) -> npt.NDArray[np.bool_]:
     return blocked & grid.free
 
 
-def closed_cells(query: Query, discs: Sequence[Disc], zone: Zone | None = None) -> npt.NDArray[np.bool_]:
-    """Return the cells (R, C) closed by discs and a zone, except the start and the goal."""
+def closed_cells(
+    query: Query, discs: Sequence[Disc], blocked: npt.NDArray[np.bool_] | None = None
+) -> npt.NDArray[np.bool_]:
+    """Return the cells (R, C) closed by discs and those of a zone, except the start and the goal."""
     closed = blocked_cells(query.grid, discs)
-    if zone is not None:
-        closed |= zone.blocked
+    if blocked is not None:
+        closed |= blocked
     closed[query.start] = closed[query.goal] = False
     return closed
 

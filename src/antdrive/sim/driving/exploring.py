@@ -23,11 +23,12 @@ from antdrive.robots.control.pursuit import obstacles_around
 from antdrive.robots.default_margin import mapless_margins
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
+from antdrive.sim.driving.guide import Follow, RouteGuide, Wait
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import RouteGuide, Rows
-from antdrive.sim.driving.recovery import TRAIL, Recovery, ScanTurn
-from antdrive.sim.driving.routes import RoutePlanner, bounds_of
-from antdrive.sim.driving.survey import PATIENCE, ROUTE_CHECK_STEP, RoutePoints, Survey, table_logged
+from antdrive.sim.driving.parts import Rows, table_logged
+from antdrive.sim.driving.recovery import TRAIL, Recovery
+from antdrive.sim.driving.route_planner import RoutePlanner, bounds_of
+from antdrive.sim.driving.survey import PATIENCE, ROUTE_CHECK_STEP, RoutePoints, Survey
 from antdrive.sim.policy import ReplanPolicy, Trigger
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
@@ -54,7 +55,6 @@ class Exploration(RouteGuide):
     """Guide that plans on the occupancy map.
 
     Attributes:
-        log: every search for a new route
         lost: whether the map has no path; the robot then stops
     """
 
@@ -65,10 +65,9 @@ class Exploration(RouteGuide):
         policy: ReplanPolicy,
         movers: MoversSeenAhead | None = None,
     ) -> None:
-        self._movers, self.survey = movers, survey
-        self.log, self.walls = [], []
-        self._routes, self._policy = planner, policy
-        self._task, self._hz, self._robot = planner.task, planner.hz, planner.robot
+        super().__init__(planner)
+        self._movers, self.survey, self._policy = movers, survey, policy
+        self._task, self._robot = planner.task, planner.robot
         self._points: RoutePoints | None = None
         self._checked = self._indexed = 0
         self._planned_at = -math.inf
@@ -79,29 +78,9 @@ class Exploration(RouteGuide):
         self._known_as: tuple[tuple[Any, ...], Task] = (), planner.task
 
     @property
-    def plan_error(self) -> str:
-        """Why the planner's plan is invalid; empty if it is valid."""
-        return self._routes.plan_error
-
-    @property
-    def footprint_margin(self) -> float | None:
-        """Clearance of plans that keep the footprint clear [m]; None while all keep the disc clear."""
-        return self._routes.footprint_margin
-
-    @property
-    def may_wait(self) -> bool:
+    def _may_wait(self) -> bool:  # type: ignore[override]
         """Whether the robot may stay in place: it has no path and tries again, or it makes a scan turn."""
-        return self.lost or self.scan_turning
-
-    @property
-    def scan_turning(self) -> bool:
-        """Whether the robot makes a scan turn."""
-        return self._recovery.scan_turn is not None
-
-    @property
-    def scan_turn(self) -> ScanTurn | None:
-        """The current scan turn; None if there is none."""
-        return self._recovery.scan_turn
+        return self.lost or self._recovery.scan_turn is not None
 
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start on the map of the first scan. Later plans do not depend on it."""
@@ -274,8 +253,10 @@ class Exploration(RouteGuide):
 
     # ---- the driver's queries
 
-    def refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
-        """Return the path with the obstacles just detected near the robot."""
+    def _way(self, path: TrackedPath) -> Follow:
+        return Wait(path, scan_turn=self._recovery.scan_turn) if self._may_wait else Follow(path)
+
+    def _refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
         if self._indexed == self.survey.whole:
             return path
         self._indexed = self.survey.whole
@@ -283,10 +264,6 @@ class Exploration(RouteGuide):
         near = self._routes.controller.lookahead_max + path.tuning.lookahead_clearance + SPARE
         discs = self.survey.map.discs((x - near, y - near, x + near, y + near))
         return path.with_obstacles(obstacles_around(np.array((x, y)), discs, path.obstacles.bounds))
-
-    def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
-        """Return a new path to a missed goal, unless a search or scan turn is under way."""
-        return None if self.may_wait else self.replan(tick, pose, Trigger.MISSED)
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Return the trigger of a new route; empty if none is due."""

@@ -1,11 +1,12 @@
 """Odometry of a logged drive, rebuilt from the seed's noise, with the covariances of the simulated errors.
 
 A log holds the estimates, which pose fixes or scans may have corrected. Odometry is what wheels and gyro alone measured.
-The covariances follow from the error models of `NoiseModel` and `DeadReckoning`, see `PoseFilter`.
+The covariances follow from the error models of `Wheels` and `Odometer`, see `PoseFilter`.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -54,46 +55,38 @@ def _rebuilt(rollout: Rollout) -> LoggedOdometry:
     The imports load compiled code, which tables of exact drives do not need.
     """
     from antdrive.robots.control.pursuit import Twist
-    from antdrive.sim.driving.localising import Exact, logged_localiser
+    from antdrive.robots.noise import moved
+    from antdrive.sim.driving.senses import logged_positioning
     from antdrive.sim.physics.engine import State
     from antdrive.sim.sensing.pose_filter import PoseFilter
 
     record, rows, track = rollout.record, len(rollout.t), rollout.record.robot.track
     period, per_tick = 1 / record.control_hz, record.rows_per_period
-    start = record.task.start
-    localiser = logged_localiser(record)
-    if isinstance(localiser, Exact):
+    senses, localiser = logged_positioning(record)
+    if not senses.noisy:
         return _true(rollout)
-    encoders, odometry, corrected = [], [], []
+    encoders, measured, corrected = [], [], []
     for row in range(0, rows - 1 + per_tick, per_tick):
         at = min(row, rows - 1)
-        localiser.sense(State(*rollout.pose[at].tolist(), *rollout.twist[at].tolist()))
-        encoders.append(localiser.encoders)
-        odometry.append(localiser.odometry)
+        odometry, fix = senses.read(State(*rollout.pose[at].tolist(), *rollout.twist[at].tolist()))
+        localiser.update(odometry, fix)
+        encoders.append(senses.encoders)
+        measured.append(odometry)
         corrected.append(localiser.covariance)
-        localiser.actuate(Twist(*rollout.command[min(row + 1, rows - 1)].tolist()))
-    twists = np.array([Twist(0.0, 0.0), *odometry[1:]])
-    turned = start[2] + np.cumsum(twists[:, 1] * period)
-    middle, way = turned - twists[:, 1] * period / 2, twists[:, 0] * period
-    ticks = np.column_stack(
-        [start[0] + np.cumsum(way * np.cos(middle)), start[1] + np.cumsum(way * np.sin(middle)), turned]
-    )
+        senses.actuate(Twist(*rollout.command[min(row + 1, rows - 1)].tolist()))
+    twists = np.array([Twist(0.0, 0.0), *measured[1:]])
+    ways = (Twist(*way) for way in (twists * period).tolist())
+    ticks = np.array(list(itertools.accumulate(ways, moved, initial=record.task.start))[1:])
     of_row = (np.arange(rows) + per_tick - 1) // per_tick  # the control period that ends at the row or after it
     before = np.maximum(of_row - 1, 0)
     elapsed = (np.arange(rows) - before * per_tick) / record.physics_hz
-    pose = _moved(ticks[before], twists[of_row], elapsed)
+    parts = zip(ticks[before].tolist(), twists[of_row].tolist(), elapsed.tolist(), strict=True)
+    pose = np.array([moved(at, Twist(speed * time, turn * time)) for at, (speed, turn), time in parts])
     noise = record.robot.noise.scaled(record.noise)
-    poses, samples = _covariances(ticks, twists, PoseFilter(noise, localiser.gyro, track, period))
+    poses, samples = _covariances(ticks, twists, PoseFilter(noise, senses.gyro, track, period))
     believed = np.array(corrected)[np.arange(rows) // per_tick] if record.localisation == "fixes" else poses[of_row]
     wheels = wheel_speeds(np.array(encoders), track)[of_row]
     return LoggedOdometry(pose, twists[of_row], wheels, poses[of_row], samples[of_row], believed)
-
-
-def _moved(pose: Floats, twist: Floats, time: Floats) -> Floats:
-    """Return poses (N, 3) after driving with twists (N, 2) for times (N,) [s]."""
-    way, turn = twist[:, 0] * time, twist[:, 1] * time
-    middle = pose[:, 2] + turn / 2
-    return pose + np.column_stack([way * np.cos(middle), way * np.sin(middle), turn])
 
 
 def _covariances(ticks: Floats, twists: Floats, model: PoseFilter) -> tuple[Floats, Floats]:

@@ -1,23 +1,23 @@
-"""Movers as a robot perceives and predicts them: ground truth, or lidar tracks."""
+"""Movers as a robot perceives and predicts them: those that it is given, or lidar tracks."""
 
 from __future__ import annotations
 
 import abc
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Point
+from antdrive.robots.control.observation import NOBODY, Movers
 from antdrive.sim.policy import Perception
-from antdrive.worlds import Trajectories
 
 if TYPE_CHECKING:
-    from antdrive.sim.driving.survey import MoverTracking
+    from antdrive.sim.driving.mover_tracking import MoverTracking
     from antdrive.sim.sensing.tracking import TrackedMovers
 
-CHUNK = 240  # control periods whose positions and velocities are computed at once
 STANDS = 0.08  # tracks slower than this stand still [m/s]
 
 #: Numbers (P,) that identify movers.
@@ -40,9 +40,10 @@ class PerceivedMovers(abc.ABC):
     def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
         """Return the numbers (M,) of all movers in a tick, positions (M, 2) [m], velocities (M, 2) [m/s] and radii (M,) [m]."""
 
+    @property
     @abc.abstractmethod
-    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
-        """Return the numbers (P,) of the perceived movers, and all positions by number (M, 2) [m]; nan where unknown."""
+    def count(self) -> int:
+        """Number of movers so far."""
 
     @abc.abstractmethod
     def radius_of(self, mover: int) -> float:
@@ -51,6 +52,13 @@ class PerceivedMovers(abc.ABC):
     @abc.abstractmethod
     def name_of(self, mover: int) -> str:
         """Return the name of a mover in messages."""
+
+    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
+        """Return the numbers (P,) of the perceived movers, and all positions by number (M, 2) [m]; nan where unknown."""
+        numbers, places, _, _ = self._now(tick)
+        everywhere = np.full((self.count, 2), np.nan)
+        everywhere[numbers] = places
+        return self.within_range(tick, position), everywhere
 
     def predict(self, tick: int, position: Point, ahead: Floats) -> tuple[Floats, Floats]:
         """Return the positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
@@ -67,59 +75,65 @@ class PerceivedMovers(abc.ABC):
         """Return the numbers (P,) of the perceived movers."""
         return self._near(tick, position)[0]
 
-    def _near(self, tick: int, position: Point) -> tuple[Numbers, Floats, Floats, Floats]:
+    def _near(
+        self, tick: int, position: Point, observed: Floats | None = None
+    ) -> tuple[Numbers, Floats, Floats, Floats]:
         numbers, places, velocities, radii = self._now(tick)
+        velocities = velocities if observed is None else observed
         if self._perception.range == math.inf:
             return numbers, places, velocities, radii
         near = np.hypot(*(places - position).T) - radii <= self._perception.range
         return numbers[near], places[near], velocities[near], radii[near]
 
 
-class GroundTruth(PerceivedMovers):
-    """Ground-truth positions, velocities or motions of movers."""
+class Given(PerceivedMovers):
+    """Movers whose positions and velocities, or motions, the robot is given.
 
-    def __init__(self, trajectories: Trajectories, perception: Perception, hz: int) -> None:
+    Args:
+        perception: what it is given, and within which range
+        hz: control periods per second
+        count: number of all movers
+        motions: positions (K, M, 2) [m] of all movers at times (K,) [s], if it is given their motions
+    """
+
+    def __init__(
+        self, perception: Perception, hz: int, count: int, motions: Callable[[Floats], Floats] | None = None
+    ) -> None:
         super().__init__(perception, hz)
         self.uncertain = perception.kind in ("velocities", "lidar")
-        self._trajectories, self._everyone = trajectories, np.arange(len(trajectories.radii))
-        self._first, self._positions, self._velocities = 0, np.empty((0, 0, 2)), np.empty((0, 0, 2))
+        self._count, self._motions, self._given = count, motions, NOBODY
+
+    def read(self, movers: Movers) -> None:
+        """Note the movers that the robot is given in this control period."""
+        self._given = movers
 
     def predict(self, tick: int, position: Point, ahead: Floats) -> tuple[Floats, Floats]:
         """Return the positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
-        if self._perception.kind != "motions":
+        if self._motions is None:
             return super().predict(tick, position, ahead)
         perceived, _, _, radii = self._near(tick, position)
-        positions = self._trajectories.positions(ahead + tick / self._hz)
-        return np.ascontiguousarray(positions[:, perceived]), radii
+        return np.ascontiguousarray(self._motions(ahead + tick / self._hz)[:, perceived]), radii
 
     def velocities(self, tick: int, position: Point) -> Floats:
-        """Return the velocities of the perceived movers (M, 2) [m/s]; those of exact positions, since the last period."""
-        if self._perception.kind != "positions":
-            return super().velocities(tick, position)
-        perceived, places, _, _ = self._near(tick, position)
-        before = self._trajectories.positions(np.array([max(tick - 1, 0) / self._hz]))[0, perceived]
-        return np.asarray((places - before) * self._hz)
-
-    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
-        """Return the numbers (P,) of the perceived movers, and all positions (M, 2) [m]."""
-        return self.within_range(tick, position), self._now(tick)[1]
+        """Return the velocities of the perceived movers (M, 2) [m/s], also of those that are predicted to stay."""
+        return self._near(tick, position, self._given.velocities)[2]
 
     def radius_of(self, mover: int) -> float:
         """Return the radius of a mover [m]."""
-        return float(self._trajectories.radii[mover])
+        return float(self._given.radii[self._given.numbers == mover][0])
 
     def name_of(self, mover: int) -> str:
         """Return the name of a mover in messages."""
         return f"movers[{mover}]"
 
+    @property
+    def count(self) -> int:
+        """Number of movers so far."""
+        return self._count
+
     def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
-        if not self._first <= tick < self._first + len(self._positions):
-            t = np.arange(tick, tick + CHUNK) / self._hz
-            self._first, self._positions = tick, self._trajectories.positions(t)
-            still = self._perception.kind == "positions"
-            self._velocities = np.zeros_like(self._positions) if still else self._trajectories.velocities(t)
-        row = tick - self._first
-        return self._everyone, self._positions[row], self._velocities[row], self._trajectories.radii
+        numbers, places, velocities, radii = self._given
+        return numbers, places, np.zeros_like(velocities) if self._perception.kind == "positions" else velocities, radii
 
 
 class Tracked(PerceivedMovers):
@@ -133,12 +147,10 @@ class Tracked(PerceivedMovers):
         super().__init__(perception, hz)
         self.tracking = tracking
 
-    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
-        """Return the numbers (P,) of the tracked movers, and all positions (M, 2) [m]; nan for lost tracks."""
-        numbers, places, _, _ = self._now(tick)
-        everywhere = np.full((self.tracking.tracker.tracks_begun, 2), np.nan)
-        everywhere[numbers] = places
-        return self.within_range(tick, position), everywhere
+    @property
+    def count(self) -> int:
+        """Number of movers so far."""
+        return self.tracking.tracker.tracks_begun
 
     def visible(self, tick: int) -> Floats:
         """Return the positions of the movers hit by the last scan (N, 2) [m], in a tick; hidden movers are omitted."""

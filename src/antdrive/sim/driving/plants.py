@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from antdrive.base import Floats, Pose
 from antdrive.base.errors import FieldError
-from antdrive.robots import Twist, footprint_clearance
+from antdrive.robots import RobotSpec, Twist, footprint_clearance
 from antdrive.robots.clearance import kernel_shape
+from antdrive.robots.noise import moved
 from antdrive.sim.driving import _kernels_movers
-from antdrive.sim.driving.parts import Ending, Step
+from antdrive.sim.driving.parts import Ending
 from antdrive.sim.log.ending import rows_after_contact
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine, State
+from antdrive.worlds import World
+
+STEP = 2e-4  # longest motion of a footprint point between two poses that a kinematic robot checks [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +71,10 @@ class Bullet:
         """Whether the robot has touched anything so far."""
         return bool(self._contacts)
 
-    def advance(self, step: Step, actuated: Twist) -> None:
+    def advance(self, command: Twist, actuated: Twist, limiter: int = 0) -> None:
         """Drive for one control period."""
         self._engine.command(*actuated)
-        self._log(self.per_tick, (*step.command, step.pursuit.limiter, *actuated))
+        self._log(self.per_tick, (*command, limiter, *actuated))
 
     def _log(self, steps: int, in_force: tuple[float, ...]) -> None:
         self.state, contacts = self._engine.advance(steps, self._motion)
@@ -116,25 +121,33 @@ class Kinematic:
 
     Attributes:
         state: pose and velocity
-        touched: whether it touched something in the last control period
+        touched: whether its footprint touched the world in the last control period
         way: the poses (K, 3) of that period [m, m, rad]
         poses: the pose at the start and after each control period [m, m, rad]
+
+    Args:
+        start: the first pose
+        period: control period [s]
+        robot: the robot
+        world: the obstacles that end its drive, checked each `STEP`; None: none
     """
 
-    def __init__(
-        self,
-        start: Pose,
-        motion: Callable[[Pose, Twist], Floats],
-        touches: Callable[[Floats], bool] = lambda way: False,
-    ) -> None:
-        self._motion, self._touches = motion, touches
+    def __init__(self, start: Pose, period: float, robot: RobotSpec, world: World | None = None) -> None:
+        self._period, self._robot, self._world = period, robot, world
         self.state, self.touched = State(*start, 0.0, 0.0), False
         self.way, self.poses = np.array([start]), [start]
 
-    def advance(self, step: Step, actuated: Twist) -> None:
+    def advance(self, command: Twist, actuated: Twist, limiter: int = 0) -> None:
         """Drive for one control period."""
-        self.way = self._motion(self.state.pose, actuated)
-        self.touched = self._touches(self.way)
-        x, y, yaw = self.way[-1].tolist()
-        self.state = State(x, y, yaw, *actuated)
-        self.poses.append((x, y, yaw))
+        count, (speed, yaw_rate) = 1, actuated
+        if self._world is not None:
+            longest = (abs(speed) + abs(yaw_rate) * self._robot.radius) * self._period
+            count = max(1, math.ceil(longest / STEP))
+        time = self._period / count
+        part = Twist(time * speed, time * yaw_rate)
+        way = list(itertools.accumulate(itertools.repeat(part, count), moved, initial=self.state.pose))[1:]
+        self.state = State(*way[-1], *actuated)
+        self.poses.append(way[-1])
+        self.way = np.array(way)
+        if self._world is not None:
+            self.touched = bool((footprint_clearance(self._world, self._robot.footprint, self.way) <= 0).any())

@@ -19,7 +19,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from antdrive.base import Floats, Point, Pose
+from antdrive.base import Floats, Pose
 from antdrive.base.kernel_cache import clock, compiled
 from antdrive.base.plane import polyline_length
 from antdrive.planners import (
@@ -33,9 +33,11 @@ from antdrive.planners import (
 )
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blockage import Blockage, blocked_cells, covered_discs, points_at, with_obstacles
+from antdrive.sim.driving.guide import Follow
 from antdrive.sim.driving.movers_ahead import MoversAhead, Traffic
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
-from antdrive.sim.driving.routes import OneRoute, RoutePlanner
+from antdrive.sim.driving.route_planner import RoutePlanner
+from antdrive.sim.driving.routes import OneRoute
 from antdrive.sim.policy import ReplanPolicy, Trigger
 from antdrive.worlds import Disc, Grid, Route, segment_clearance
 
@@ -54,7 +56,6 @@ class Replanning(OneRoute):
     ) -> None:
         super().__init__(planner)
         self.policy = policy
-        self._hz = planner.hz
         self._predictor, self._clearance = movers, clearance
         self._task = dataclasses.replace(planner.task, world=dataclasses.replace(planner.task.world, movers=()))
         self._timed = bool(planner.motions)
@@ -71,17 +72,11 @@ class Replanning(OneRoute):
         return super().route(grid, plan)
 
     @property
-    def blocked(self) -> str:
-        """Description of the mover that blocks every route, once the robot's patience is over; else empty."""
+    def _blocked(self) -> str:  # type: ignore[override]
         return self.blockage.reason
 
-    def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
-        """Return a new path for a robot that stands at the end of its route, but not at the goal; None if there is none."""
-        return self.replan(tick, pose, Trigger.MISSED)
-
-    def clearance_reduction(self, tick: int, position: Point) -> Floats:
-        """Return how much closer than usual the robot may pass each perceived mover (P,) [m]."""
-        return self.blockage.clearance_reduction(tick, position)
+    def _way(self, path: TrackedPath) -> Follow:
+        return Follow(path, self.schedule, self.blockage)
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Return why a new route is due; empty if none is."""
@@ -176,8 +171,7 @@ class CellByCell(Replanning):
         return super().route(grid, plan)
 
     @property
-    def may_wait(self) -> bool:
-        """Whether a robot at the end of its route may wait for a new one."""
+    def _may_wait(self) -> bool:  # type: ignore[override]
         return not self._arrived
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
@@ -196,8 +190,8 @@ class CellByCell(Replanning):
     @compiled()
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """Return the path to the next cell; None if the robot waits."""
-        if trigger == Trigger.MISSED:  # before arrival the next decision is due soon
-            return super().replan(tick, pose, trigger) if self._arrived else None
+        if trigger == Trigger.MISSED:
+            return super().replan(tick, pose, trigger)
         now, spent = tick / self._hz, clock()
         self._replanned_at = now
         covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)

@@ -3,70 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from antdrive.base import Floats, Pose
-from antdrive.base.plane import arc_lengths
-from antdrive.planners import TimedPlan
+from antdrive.base import Pose
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, TrackedPath, Twist
 from antdrive.sim.driving.blockage import points_at
+from antdrive.sim.driving.guide import Moment, Wait
 from antdrive.sim.driving.habits import Habits
-from antdrive.sim.driving.parts import Guide, Moment, Step
+from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
-from antdrive.worlds import Route, Task
+from antdrive.worlds import Task
 
 if TYPE_CHECKING:
-    from antdrive.sim.driving.exploring import Exploration
-    from antdrive.sim.driving.survey import MoverTracking
-
-LOOKAHEAD = 0.4  # lookahead of the schedule's speed limit [s]
-MAX_LAG = 0.5  # a robot farther behind its schedule is late [m]
-ROUNDING = 1e-6  # arc lengths this close are one [m]
-
-
-@dataclass(frozen=True, eq=False)
-class Schedule:
-    """Target arc length over time, linear in between.
-
-    On a route with turns it begins at the first cell, to which the robot drives at once.
-    """
-
-    t: Floats  # times (N,) [s]
-    arc: Floats  # distances along the route at those times (N,) [m]
-    # Distances along the route at which the robot stops to turn on the spot (C,) [m].
-    corners: Floats = field(default_factory=lambda: np.empty(0))
-
-    @classmethod
-    def of(cls, plan: TimedPlan, route: Route) -> Schedule:
-        """Create the schedule of a timed plan along the route through its cells."""
-        covered, t = arc_lengths(plan.xy), np.stack([plan.arrive, plan.leave], axis=1).ravel()
-        if route.turns is not None:
-            lead = route.arc[np.hypot(*(route.xy[:2] - plan.xy[0]).T).argmin()]
-            return cls(t, np.repeat(lead + covered, 2), route.arc[route.turns != 0.0])
-        share = covered / covered[-1] if covered[-1] > 0 else covered
-        return cls(t, np.repeat(share * route.length, 2))
-
-    def due(self, t: float) -> float:
-        """Return the target arc length [m] at time `t` [s]."""
-        return float(np.interp(t, self.t, self.arc))
-
-    def late(self, t: float, arc: float) -> bool:
-        """Return whether a robot at `arc` [m] is more than `MAX_LAG` behind at time `t` [s]."""
-        return self.due(t) - max(arc, self.arc.item(0)) > MAX_LAG
-
-    def speed_limit(self, t: float, arc: float) -> float:
-        """Return the speed [m/s] that keeps a robot at `arc` [m] at time `t` [s] from getting ahead.
-
-        It is infinite at the end, and up to a corner that is due: the sooner the robot is there, the sooner it turns.
-        """
-        due = self.due(t + LOOKAHEAD)
-        nearing = arc < due - ROUNDING and bool((np.abs(self.corners - due) < ROUNDING).any())
-        if nearing or t + LOOKAHEAD >= self.t[-1]:
-            return math.inf
-        return max(0.0, due - arc) / LOOKAHEAD
+    from antdrive.sim.driving.mover_tracking import MoverTracking
 
 
 def slow_down(command: Twist, last: Twist, limit: float, max_change: float) -> Twist:
@@ -82,8 +33,6 @@ CORNER_STEP = 0.1  # between the places of a route that are compared with corner
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop within this fraction of the goal's tolerance
 AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
-EXPLORING_LIMITERS = (*LIMITERS, "sight")  # names of the limiting rules of a mapless robot
-SIGHT_LIMIT = EXPLORING_LIMITERS.index("sight")
 
 
 class Pursuit:
@@ -100,37 +49,39 @@ class Pursuit:
         """Return the controller's command."""
         last, before = now.before.command, now.before.pursuit
         if now.clock.turning <= self._full_turn:
-            return Step(*self._controller.step(now.path, now.pose, last, before))
-        return Step(*self._controller.step(now.path.preferring_arcs, now.pose, last, before._replace(turning=False)))
+            return Step(*self._controller.step(now.way.path, now.pose, last, before))
+        return Step(
+            *self._controller.step(now.way.path.preferring_arcs, now.pose, last, before._replace(turning=False))
+        )
 
 
 class TurnToScan:
     """Rule: make the scan turn once the robot stands; stop where it has no path."""
 
-    def __init__(self, guide: Exploration, robot: RobotSpec, hz: int) -> None:
-        self._guide, self._robot, self._hz = guide, robot, hz
+    def __init__(self, robot: RobotSpec, hz: int) -> None:
+        self._robot, self._hz = robot, hz
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the scan turn's command, or one that brakes for it."""
-        scan_turn, last = self._guide.scan_turn, now.before.command
-        if scan_turn is not None and not last.speed:
+        way, last = now.way, now.before.command
+        if not isinstance(way, Wait):
+            return step
+        if way.scan_turn is not None and not last.speed:
             turning = step.pursuit._replace(limiter=ROTATING)
-            return step._replace(command=scan_turn.command(now.pose, last), pursuit=turning, speed_limit=0.0)
-        if scan_turn is not None or self._guide.lost:
-            command = braked(last, self._robot, self._hz)
-            return step._replace(command=command, speed_limit=max(command.speed, 0.0))
-        return step
+            return step._replace(command=way.scan_turn.command(now.pose, last), pursuit=turning, speed_limit=0.0)
+        command = braked(last, self._robot, self._hz)
+        return step._replace(command=command, speed_limit=max(command.speed, 0.0))
 
 
 class KeepToSchedule:
     """Rule: keep to the schedule of a plan in space and time."""
 
-    def __init__(self, guide: Guide, robot: RobotSpec, hz: int) -> None:
-        self._guide, self._hz, self._max_change = guide, hz, robot.max_acceleration / hz
+    def __init__(self, robot: RobotSpec, hz: int) -> None:
+        self._hz, self._max_change = hz, robot.max_acceleration / hz
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the command, limited to the schedule's speed."""
-        schedule = self._guide.schedule
+        schedule = now.way.schedule
         if schedule is None:
             return step
         limit = schedule.speed_limit(now.tick / self._hz, step.pursuit.arc)
@@ -150,7 +101,7 @@ class SlowAtCorners:
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the command, limited to the speed for the corners ahead."""
-        limit = self.limit(now.path, step.pursuit.arc, step.command.speed)
+        limit = self.limit(now.way.path, step.pursuit.arc, step.command.speed)
         if limit >= step.command.speed:
             return step
         command = slow_down(step.command, now.before.command, limit, self._max_change)
@@ -175,7 +126,6 @@ class Avoid:
         self,
         avoidance: Avoidance,
         movers: PerceivedMovers,
-        guide: Guide,
         task: Task,
         robot: RobotSpec,
         hz: int,
@@ -186,15 +136,14 @@ class Avoid:
         losses: tuple[float, float] = (0.0, 0.0),  # see `Avoidance.avoid`
         habits: Habits | None = None,  # a second prediction of movers
     ) -> None:
-        self._avoidance, self._movers, self._guide = avoidance, movers, guide
-        self._task, self._robot, self._hz = task, robot, hz
+        self._avoidance, self._movers, self._task, self._robot, self._hz = avoidance, movers, task, robot, hz
         self._goal_share, self._backwards, self._delay, self._losses = goal_share, backwards, delay, losses
         self._habits = habits
         self._state = AvoidanceState()
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the command that avoids movers."""
-        avoidance, (tick, pose, _, path, before, _) = self._avoidance, now
+        avoidance, tick, pose, way, before = self._avoidance, now.tick, now.pose, now.way, now.before
         last, ahead = before.command, avoidance.prediction_times
         stopping = before.avoids and self._stops_at_goal(pose, last)
         if stopping:
@@ -205,14 +154,14 @@ class Avoid:
         ahead = ahead + self._delay
         movers, radii = self._movers.predict(tick, pose[:2], ahead)
         velocities = self._movers.velocities(tick, pose[:2])
-        kept = radii - self._guide.clearance_reduction(tick, pose[:2])
+        kept = radii - way.blockage.clearance_reduction(tick, pose[:2]) if way.blockage else radii
         if self._habits is not None:
             again, sizes = self._habits.predict(tick, pose[:2], ahead, movers, radii)
             if len(sizes):
                 movers, kept = np.concatenate((movers, again), axis=1), np.concatenate((kept, sizes))
                 velocities = np.concatenate((velocities, (again[1] - again[0]) / avoidance.step))
         command, avoids, self._state = avoidance.avoid(
-            path,
+            way.path,
             self._robot,
             pose,
             last,

@@ -7,8 +7,9 @@ from collections.abc import Callable
 
 from antdrive.base import Pose
 from antdrive.robots import RobotSpec, Twist
-from antdrive.sim.driving.parts import Moment, Step
-from antdrive.sim.driving.rules import SIGHT_LIMIT, stopping_time
+from antdrive.sim.driving.guide import Moment
+from antdrive.sim.driving.parts import SIGHT_LIMIT, Step
+from antdrive.sim.driving.rules import stopping_time
 from antdrive.sim.driving.survey import Survey
 
 SLOWEST = 0.02  # below this speed `SHORT` applies to the turn as well [m/s]

@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Point, Pose
 from antdrive.robots import RobotSpec, Twist
-from antdrive.robots.lidar import Lidar
+from antdrive.robots.control.observation import FirstSight
 from antdrive.sim.driving import _kernels_hits
-from antdrive.sim.driving.parts import Rows
+from antdrive.sim.driving.mover_tracking import MAP_CELL, MoverTracking
 from antdrive.sim.log.record import DriveRecord
-from antdrive.sim.log.rollout import scans_logged
-from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import Trigger
 from antdrive.sim.sensing.mapping import OccupancyMap, clear_way, shape_of
 from antdrive.sim.sensing.matching import FAR, ScanMatcher, without_sliding
-from antdrive.sim.sensing.scanner import Scanner
-from antdrive.sim.sensing.tracking import Ground, MappedGround, MoverTracker, TrackedMovers, ends
-from antdrive.worlds import Route, Task, Trajectories, World
+from antdrive.sim.sensing.tracking import Ground
+from antdrive.worlds import Route, World
 
-MAP_CELL = 0.05  # side of the map's cells [m]
 HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # range up to which hits enter the map [m]
 RECENT = 1.0  # after a reset, scans up to this age enter the new map [s]
 PAD = 0.01  # distance kept from hits and from unknown ground, for rounding of ranges and cells [m]
@@ -34,7 +29,6 @@ PATIENCE = 3  # failed plans in a row before the map is reset
 TOLERANCE = 0.008  # clearance that a route may lose without a replan [m]
 ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 BLUR = 0.02  # additional allowance per metre of distance [m/m]
-PERSON = 0.5  # width of a person [m]
 SHARPEST = 0.05  # arcs of a smaller radius are treated as turns on the spot [m]
 FAR_AMONG_MOVERS = 15.0  # matching range among movers, which hide near landmarks [m]
 
@@ -62,15 +56,6 @@ def reset_ticks(record: DriveRecord) -> Iterator[int]:
         failures = 0 if replan.solved else failures + 1
 
 
-def table_logged(
-    taken: Iterable[tuple[int, npt.NDArray[Any]]], columns: int, log: Rows, per_tick: int
-) -> npt.NDArray[np.float32]:
-    """Return a table (K, columns) of a log: entries noted in control periods; each begins with the log row of its period."""
-    kept = [(tick * per_tick, lines) for tick, lines in taken if tick * per_tick < len(log.t)]
-    tables = [np.column_stack((np.full(len(lines), row), lines)) for row, lines in kept]
-    return np.concatenate(tables or [np.empty((0, columns))]).astype(np.float32)
-
-
 class RoutePoints(NamedTuple):
     """Points of a route for route checks, `ROUTE_CHECK_STEP` apart."""
 
@@ -88,76 +73,6 @@ class RoutePoints(NamedTuple):
         return cls(points, needed, arcs, blocks)
 
 
-class MoverTracking:
-    """Mover tracker of a drive, with its log.
-
-    Attributes:
-        tracker: detects and tracks movers
-        tick: the control period of the last scan
-        sight: area covered by its beams within `reach` [m^2]
-        reach: range up to which beams lie no farther apart than a map cell [m]
-    """
-
-    def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
-        lidar = lidar.at(hz)
-        self.tracker, self.tick = MoverTracker(lidar, pose_xy, pose_yaw), 0
-        self.sight, self.reach = 0.0, min(lidar.max_range, MAP_CELL / lidar.spacing)
-        self._last: tuple[Pose, Floats, npt.NDArray[np.bool_]] | None = None
-        self._known_corners: Floats | None = None
-        self._hz, self._spacing, self._lidar = hz, lidar.spacing, lidar
-        self._settle = max(2, round(self.tracker.rules[False].settle * lidar.rate))
-        self._log: list[tuple[int, TrackedMovers]] = []
-
-    def read(self, ground: Ground, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
-        """Update the tracks with a scan; return which beams hit tracked movers (beams,)."""
-        theirs = self.tracker.update(ground, pose, ranges, tick / self._hz)
-        self.tick = tick
-        crossed = np.clip(ranges, 0.0, self.reach)
-        self.sight = float(0.5 * self._spacing * (crossed * crossed).sum())
-        self._log.append((tick, self.tracker.movers()))
-        self._last, self._known_corners = (pose, ranges, theirs), None
-        return theirs
-
-    @property
-    def corners(self) -> Floats:
-        """Where ground that may hide people from the last scan begins, movers apart (N, 2) [m].
-
-        These are ends of surfaces at least as wide as a person, and with as much space behind.
-        """
-        if self._known_corners is None:
-            self._known_corners = self._corners(*self._last) if self._last else np.empty((0, 2))
-        return self._known_corners
-
-    def _corners(self, pose: Pose, ranges: Floats, theirs: npt.NDArray[np.bool_]) -> Floats:
-        """Return the corners that a scan shows (N, 2) [m]."""
-        far = np.clip(ranges, 0.0, self._lidar.max_range)
-        steps = np.diff(far)
-        jumps = np.flatnonzero(np.abs(steps) > PERSON)
-        first, last = np.append(0, jumps + 1), np.append(jumps, len(far) - 1)  # beams of each surface
-        begins, finishes = (ends(self._lidar, pose, far, beams) for beams in (first, last))
-        wide = np.hypot(*(finishes - begins).T) >= PERSON
-        nearer = np.where(steps[jumps] > 0, jumps, jumps + 1)
-        hides = np.where(steps[jumps] > 0, wide[:-1], wide[1:]) & np.isfinite(ranges[nearer]) & ~theirs[nearer]
-        return ends(self._lidar, pose, ranges, nearer[hides])
-
-    def update_on_map(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
-        """Update with a scan of a robot that makes its own map, before the map takes the scan."""
-        return self.read(MappedGround(seen, self._settle), pose, ranges, tick)
-
-    def standing(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> Floats:
-        """Return an unprocessed scan without hits on possible movers (beams,) [m]: those ranges are infinite."""
-        ground = MappedGround(seen, self._settle)
-        return np.where(self.tracker.suspected(ground, pose, ranges, tick / self._hz), np.inf, ranges)
-
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
-        """Return the array `tracks` of a log (K, 7)."""
-        lines = (
-            (tick, np.column_stack((movers.numbers, movers.positions, movers.velocities, movers.radii)))
-            for tick, movers in self._log
-        )
-        return {"tracks": table_logged(lines, 7, log, per_tick)}
-
-
 class Scan(NamedTuple):
     """A scan with its estimated pose."""
 
@@ -168,133 +83,84 @@ class Scan(NamedTuple):
     movers: npt.NDArray[np.bool_] | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class SimulatedLidar:
-    """Simulated lidar in the true world."""
-
-    scanner: Scanner  # ray casting in the true world
-    world: World  # the static obstacles
-    trajectories: Trajectories | None  # true motions of the movers; None without movers
-    rng: np.random.Generator | None  # source of range noise; None for no noise
-    hz: int  # control periods per second
-
-    @classmethod
-    def of(
-        cls, lidar: Lidar, world: World, trajectories: Trajectories, *, seed: int, noisy: bool, hz: int
-    ) -> SimulatedLidar:
-        """Create a lidar in a world, with noise from a drive's seed and at most one scan per control period."""
-        rng = random_stream(seed, "lidar") if noisy else None
-        return cls(Scanner.of(lidar.at(hz), world), world, trajectories or None, rng, hz)
-
-    @property
-    def movers_at_start(self) -> Floats | None:
-        """Positions of the movers at time 0, as discs (M, 3): x, y, radius [m]; None without movers."""
-        movers = self.trajectories
-        return np.column_stack((movers.positions(np.zeros(1))[0], movers.radii)) if movers else None
-
-    def due(self, tick: int, last: int) -> bool:
-        """Return whether a scan is due in a control period. `last` is the period of the latest scan; negative: none yet."""
-        return last < 0 or (tick != last and self.scanner.lidar.due(tick, self.hz))
-
-    def ranges(self, tick: int, pose: Pose) -> Floats:
-        """Return a scan (beams,) [m]."""
-        movers = self.trajectories
-        if not movers:
-            return self.scanner.scan(pose, rng=self.rng)
-        return self.scanner.scan(pose, movers.positions(np.array([tick / self.hz]))[0], movers.radii, self.rng)
-
-
 class Scans:
-    """Scans of a drive. Only their ranges depend on the true poses and the true world.
+    """Scans of a drive, at their estimated poses.
 
     Attributes:
         scans: all scans so far
+        tracking: the mover tracker; None without tracking
     """
 
-    def __init__(self, sensor: SimulatedLidar) -> None:
+    def __init__(self, tracking: MoverTracking | None = None) -> None:
         self.scans: list[Scan] = []
-        self._sensor = sensor
-
-    def scan(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
-        """Scan from the true pose if a scan is due; return the estimate, possibly corrected by the scan."""
-        if not self._sensor.due(tick, self.scans[-1].tick if self.scans else -1):
-            return estimate
-        return self.read(tick, estimate, self._sensor.ranges(tick, pose))
+        self.tracking = tracking
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
-        """Store a scan; return the estimate unchanged."""
+        """Store a scan; return the estimate, possibly corrected by the scan."""
         self.scans.append(Scan(tick, estimate, ranges))
         return estimate
 
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
-        """Return the log's arrays of scans."""
-        return scans_logged(((scan.tick, scan.ranges) for scan in self.scans), per_tick, len(log.t))
-
 
 class MoverDetector(Scans):
-    """Lidar-based mover detection for a robot with a map.
+    """Lidar-based mover detection for a robot with a map."""
 
-    Attributes:
-        tracking: the tracks of the movers
-    """
-
-    def __init__(self, sensor: SimulatedLidar, ground: Ground, tracking: MoverTracking) -> None:
-        super().__init__(sensor)
-        self.tracking, self._ground = tracking, ground
+    def __init__(self, ground: Ground, tracking: MoverTracking) -> None:
+        super().__init__(tracking)
+        self._tracks, self._ground = tracking, ground
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
         """Store a scan and track movers in it; return the estimate."""
-        self.tracking.read(self._ground, estimate, ranges, tick)
+        self._tracks.read(self._ground, estimate, ranges, tick)
         return super().read(tick, estimate, ranges)
 
 
 class Survey(Scans):
     """Mapping for a mapless robot.
 
-    True poses and the true world are used only for scan ranges, with one exception: at the start, the free ground within the
-    robot's turning circle is given.
+    At the start, the free ground within the robot's turning circle is given.
 
     Attributes:
         lidar: the lidar
         map: the occupancy map
         whole: number of scans entered as a whole, with their free ground
+
+    Args:
+        robot: the robot; it has a lidar
+        start: the start pose
+        goal: the goal [m]
+        hz: control periods per second
+        sight: what it is given at its start; None: nothing
+        matching: whether to correct estimates by scan matching
         tracking: the mover tracker; None without tracking
     """
 
     def __init__(
         self,
-        sensor: SimulatedLidar,
         robot: RobotSpec,
         start: Pose,
         goal: Point,
+        hz: int,
+        sight: FirstSight | None = None,
         *,
         matching: bool = False,
         tracking: MoverTracking | None = None,
     ) -> None:
-        super().__init__(sensor)
-        self.lidar = sensor.scanner.lidar
+        super().__init__(tracking)
+        assert robot.lidar is not None
+        self.lidar = robot.lidar.at(hz)
         foot = robot.footprint
         self._shape = shape_of(dataclasses.replace(foot, rounding=foot.rounding + PAD))
         self._turning_room = turning_room(robot.radius)
         self._goal = goal
-        self.tracking = tracking
         moving = tracking is not None
         horizon = horizon_of(tracks_movers=moving)
         self.map = OccupancyMap(self.lidar, MAP_CELL, start[:2], horizon, goal=goal, moving=moving)
-        self.map.mark_free(start[:2], self._turning_room, sensor.world, sensor.movers_at_start)
+        self.map.mark_free(start[:2], self._turning_room, sight.ground if sight else None)
         self._recent = math.ceil(RECENT * self.lidar.rate)
-        matches = matching and (moving or sensor.trajectories is None)  # movers without tracks would shift the match
-        self._matcher = ScanMatcher(self.lidar, FAR_AMONG_MOVERS if moving else FAR) if matches else None
+        self._matcher = ScanMatcher(self.lidar, FAR_AMONG_MOVERS if moving else FAR) if matching else None
         self.whole = 0
-
-    @classmethod
-    def of(
-        cls, robot: RobotSpec, task: Task, sensor: SimulatedLidar, *, matching: bool, tracking: MoverTracking | None
-    ) -> Survey:
-        """Create the survey of a drive, with the first scan from the start."""
-        survey = cls(sensor, robot, task.start, task.goal, matching=matching, tracking=tracking)
-        survey.scan(0, task.start, task.start)
-        return survey
+        if sight is not None:
+            self.read(0, start, sight.ranges)
 
     def read(self, tick: int, estimate: Pose, ranges: Floats) -> Pose:
         """Enter a scan in the map; return the estimate, possibly corrected by scan matching."""

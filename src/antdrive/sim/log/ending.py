@@ -76,7 +76,7 @@ def false_endings(rollout: Rollout) -> Iterator[str]:
     }.get(rollout.outcome)
     if check is not None:
         yield from check(rollout)
-    if rollout.outcome in (Outcome.NO_PATH, Outcome.STOPPED):
+    if rollout.outcome is Outcome.NO_PATH:
         yield f"outcome: {rollout.outcome.key} ends a run before the robot drives, but the log has rows"
 
 

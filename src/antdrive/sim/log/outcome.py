@@ -15,7 +15,7 @@ class Outcome(enum.Enum):
     `HIT_BY_TELEPORT` are not the planner's fault, but count as failures; no drive with a contact is certified. `BLOCKED`: movers
     closed every route and stood still until the robot's patience (`ReplanPolicy.patience`) was over. `NO_PATH`, `STOPPED` and
     `INVALID_PLAN` end a run before the robot drives, without a rollout. An invalid replan ends the drive as `INVALID_PLAN`,
-    with the rows until then.
+    and a `Session` that is left early as `STOPPED`, with the rows until then.
 
     `antdrive run` exits with 0 if the outcome is `SUCCEEDED` and the drive is certified, else with 1.
     """
@@ -28,7 +28,7 @@ class Outcome(enum.Enum):
     BLOCKED = "obstacles that stand still block the way to the goal"
     STUCK = "stopped making progress"
     NO_PATH = "no path on this grid"
-    STOPPED = "planning stopped early"
+    STOPPED = "stopped early"
     INVALID_PLAN = "the planner's plan is invalid"
 
     @property

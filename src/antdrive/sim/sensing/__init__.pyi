@@ -1,4 +1,3 @@
-from .dead_reckoning import DeadReckoning as DeadReckoning
 from .mapping import OccupancyMap as OccupancyMap
 from .mapping import clear_way as clear_way
 from .mapping import shape_of as shape_of

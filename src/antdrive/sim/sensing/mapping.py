@@ -192,18 +192,15 @@ class OccupancyMap:
         discs: Floats = kernels.discs_within(*(within or EVERYWHERE), self.plain)
         return discs
 
-    def mark_free(self, place: Point, radius: float, world: World | None = None, movers: Floats | None = None) -> Cells:
+    def mark_free(self, place: Point, radius: float, world: World | None = None) -> Cells:
         """Mark unknown ground as free, such as that under the robot, and return the cells (K, 2).
 
         Args:
             place: x, y [m]
             radius: distance around it [m]
             world: cells that meet its cylinders or walls stay unknown; None: no world
-            movers: discs of movers (N, 3) [m], whose cells stay unknown as well; None: no movers
         """
         discs, walls = (_NONE, EVERYWHERE) if world is None else (world.discs, world.bounds)
-        if movers is not None:
-            discs = np.concatenate((discs, movers))
         count = kernels.take_as_free(*place, radius, discs, np.array(walls), self.plain, self._changed)
         return self._changed[:count].copy()
 

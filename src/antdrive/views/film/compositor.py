@@ -7,8 +7,6 @@ their meshes are drawn and blended in where they are nearer. A moving camera nee
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,11 +15,10 @@ from PIL import Image
 
 from antdrive.base.types import Floats
 from antdrive.views import colours
-from antdrive.views.colours import Colour
 from antdrive.views.film import _kernels_paint as kernels
 from antdrive.views.film.camera import Camera, Picture
 from antdrive.views.film.ground import capsules, dashes, kerb_width, paint_ground, ring
-from antdrive.views.film.lidar_view import BeamPainter, OwnMapPainter
+from antdrive.views.film.lidar_view import Backdrop, BeamPainter, OwnMapPainter
 from antdrive.views.film.meshes import Part, cylinder, join, kerb, robot_height, robot_parts
 from antdrive.views.film.solids import Box, Solid, draw_solids, merged, overlap, placed
 from antdrive.views.film.text import glow, put
@@ -35,34 +32,6 @@ HIDDEN_OPACITY = 0.16  # of a body behind a cylinder
 SHADOW_BLUR = 0.05  # softness of the shadow of a flat body [m]
 RING_OFF = 0.05  # distance of a ring from the surface of its tracked mover [m]
 FORECAST = 1.5  # horizon of the movers' drawn motion [s]
-
-
-@dataclass(frozen=True, eq=False)
-class Backdrop:
-    """Picture of all static bodies by one camera."""
-
-    camera: Camera
-    pixels: Picture  # the picture (H, W, 3)
-    visible: npt.NDArray[np.float32]  # fraction of each pixel that shows ground (H, W)
-    # depth of the bodies in clip space at the rendered resolution, 1 for ground
-    depth: npt.NDArray[np.float32]
-    bodies: npt.NDArray[np.int32]  # index of the visible obstacle at the rendered resolution, -1 for ground
-
-    @cached_property
-    def forward(self) -> Floats:
-        """Homography (3, 3) from the ground to pixels."""
-        return self.camera.ground
-
-    @cached_property
-    def inverse(self) -> Floats:
-        """Homography (3, 3) from pixels to the ground."""
-        return np.asarray(np.linalg.inv(self.forward))
-
-    def blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float, *, over: bool = False) -> None:
-        """Blend capsules (N, 5) of one colour into the ground of a frame, or over all bodies."""
-        visible = np.ones_like(self.visible) if over else self.visible
-        tint = np.array(colour, dtype=np.float64)
-        kernels.blend_capsules(frame, visible, self.forward, self.inverse, rows, tint, strength)
 
 
 class Compositor:

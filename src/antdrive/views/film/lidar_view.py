@@ -2,30 +2,56 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.base.types import Floats
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import beams_of, lidar_of
 from antdrive.views import _kernels_seen as kernels
-from antdrive.views.colours import BEAM, HATCH, HIT, PALE
+from antdrive.views.colours import BEAM, HATCH, HIT, PALE, Colour
 from antdrive.views.film import _kernels_paint as painting
-from antdrive.views.film.camera import Picture
+from antdrive.views.film.camera import Camera, Picture
 from antdrive.views.film.ground import capsules
 from antdrive.views.map_reconstruction import MapReconstruction, enclosing_cylinders, world_points
 from antdrive.views.scene import Scene
-
-if TYPE_CHECKING:
-    from antdrive.views.film.compositor import Backdrop
-
 
 VEIL, LINES = 0.62, 0.75  # opacity of the veil over unknown ground and of its hatching
 PALENESS = 0.80  # of undetected obstacles
 TINT, BEAMS = 0.13, 0.30  # opacity of the scanned area and of the beams
 DRAWN_BEAMS = 90  # maximum number of drawn beams in a full circle
 HATCHING = 9.0  # spacing of the hatching [px]
+
+
+@dataclass(frozen=True, eq=False)
+class Backdrop:
+    """Picture of all static bodies by one camera."""
+
+    camera: Camera
+    pixels: Picture  # the picture (H, W, 3)
+    visible: npt.NDArray[np.float32]  # fraction of each pixel that shows ground (H, W)
+    # depth of the bodies in clip space at the rendered resolution, 1 for ground
+    depth: npt.NDArray[np.float32]
+    bodies: npt.NDArray[np.int32]  # index of the visible obstacle at the rendered resolution, -1 for ground
+
+    @cached_property
+    def forward(self) -> Floats:
+        """Homography (3, 3) from the ground to pixels."""
+        return self.camera.ground
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """Homography (3, 3) from pixels to the ground."""
+        return np.asarray(np.linalg.inv(self.forward))
+
+    def blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float, *, over: bool = False) -> None:
+        """Blend capsules (N, 5) of one colour into the ground of a frame, or over all bodies."""
+        visible = np.ones_like(self.visible) if over else self.visible
+        tint = np.array(colour, dtype=np.float64)
+        painting.blend_capsules(frame, visible, self.forward, self.inverse, rows, tint, strength)
 
 
 class BeamPainter:

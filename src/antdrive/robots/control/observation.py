@@ -1,0 +1,85 @@
+"""Observations of a robot, and its briefing before a drive. Nothing here holds what is true."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base import Floats, Point, Pose
+from antdrive.robots.control.pursuit import Twist
+from antdrive.robots.spec import RobotSpec
+from antdrive.worlds import World
+
+
+class Movers(NamedTuple):
+    """Movers that a robot is given in a control period."""
+
+    numbers: npt.NDArray[np.int64]  # (P,)
+    positions: Floats  # (P, 2) [m]
+    velocities: Floats  # (P, 2) [m/s]
+    radii: Floats  # (P,) [m]
+
+
+NOBODY = Movers(np.empty(0, dtype=np.int64), np.empty((0, 2)), np.empty((0, 2)), np.empty(0))
+
+
+class FirstSight(NamedTuple):
+    """What a mapless robot is given at its start."""
+
+    ground: World  # what stands around the start
+    ranges: Floats  # the first scan (beams,) [m]
+
+
+class Observation(NamedTuple):
+    """What a robot knows in one control period.
+
+    Attributes:
+        tick: the number of the control period
+        t: time since the start [s]
+        pose: estimated pose
+        pending: the commands that have not reached the motors yet, oldest first
+        twist: measured speed and yaw rate
+        scan: ranges of a scan (beams,) [m]; None if none was due
+        movers: movers that it is given
+    """
+
+    tick: int
+    t: float
+    pose: Pose
+    pending: tuple[Twist, ...]
+    twist: Twist
+    scan: Floats | None = None
+    movers: Movers = NOBODY
+
+
+@dataclass(frozen=True, eq=False)
+class Briefing:
+    """What a robot knows before its drive.
+
+    Attributes:
+        robot: the robot
+        start: the first pose: x, y [m] and yaw [rad], known exactly
+        goal: the goal [m]
+        tolerance: distance to the goal at which the robot has arrived [m]
+        hz: control periods per second
+        map: the static obstacles; None for a mapless robot
+        sight: what a mapless robot is given at its start
+        matching: whether scans may correct the observed poses
+        movers: number of all movers
+        motions: positions (K, M, 2) [m] at times (K,) [s], if it is given them
+    """
+
+    robot: RobotSpec
+    start: Pose
+    goal: Point
+    tolerance: float
+    hz: int
+    map: World | None = None
+    sight: FirstSight | None = None
+    matching: bool = False
+    movers: int = 0
+    motions: Callable[[Floats], Floats] | None = None

@@ -1,0 +1,137 @@
+"""Body of a robot in a drive: its plant, its senses, and the referee that ends the drive."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from antdrive.base import Pose
+from antdrive.robots import Twist
+from antdrive.robots.control.observation import NOBODY, Observation
+from antdrive.sim.driving.localising import Exact
+from antdrive.sim.driving.parts import SILENT, Ending, Note, Rows
+from antdrive.sim.driving.senses import MoverSense, Senses, SimulatedLidar
+from antdrive.sim.log.ending import arrived, control_periods, outcome_at
+from antdrive.sim.log.outcome import Outcome
+
+if TYPE_CHECKING:
+    from antdrive.sim.physics.engine import State
+    from antdrive.worlds import Task
+
+
+class Plant(Protocol):
+    """Robot that executes twists: in physics (`Bullet`) or exactly (`Kinematic`)."""
+
+    state: State  # true pose and velocity
+
+    @property
+    def touched(self) -> bool:
+        """Whether the robot has touched anything so far."""
+
+    def advance(self, command: Twist, actuated: Twist, limiter: int = 0) -> None:
+        """Drive for one control period with the given motor targets; the command and its limiter are for the log."""
+
+
+class Body:
+    """Robot that is observed and commanded period by period, until its drive ends.
+
+    Attributes:
+        tick: the number of the control period
+        ended: how the drive ended; None while it goes on
+        estimates: the pose in which the robot believed in each control period so far
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        senses: Senses,
+        localiser: Exact,
+        lidar: SimulatedLidar | None = None,
+        movers: MoverSense | None = None,
+        *,
+        hz: int,  # control periods per second
+        limit: float,  # time limit [s]
+        task: Task | None = None,  # where the drive ends; None: nowhere
+    ) -> None:
+        self._plant, self._senses, self._localiser, self._lidar, self._task = plant, senses, localiser, lidar, task
+        self._movers, self._periods, self._hz = movers, control_periods(limit, hz), hz
+        self.estimates: list[Pose] = []
+        self._command = Twist(0.0, 0.0)  # in force
+        self._now: Observation | None = None
+        self.tick = 0
+        self.ended = Ending(Outcome.COLLIDED) if plant.touched else self._timed_out()
+
+    def observe(self) -> Observation:
+        """Return what the robot observes in this control period."""
+        if self._now is None:
+            state = self._plant.state
+            pose = self._localiser.update(*self._senses.read(state))
+            scan = self._lidar.scan(self.tick, state.pose) if self._lidar else None
+            twist, pending = Twist(state.speed, state.yaw_rate), tuple(self._senses.pending)
+            movers = self._movers.read(self.tick, pose[:2]) if self._movers else NOBODY
+            self._now = Observation(self.tick, self.tick / self._hz, pose, pending, twist, scan, movers)
+        return self._now
+
+    def step(self, command: Twist | None, note: Note = SILENT) -> None:
+        """Drive for one control period; without a command, or at the goal, the drive ends where the robot stands."""
+        now = self.observe()
+        believed = self._localiser.pose = note.pose or now.pose
+        self.estimates.append(believed)
+        if self._arrived(believed, now.twist) or (command is None and note.ending is None):
+            self.ended = self._judged(believed)
+            return
+        if command is None:
+            self.ended = note.ending
+            return
+        self._command, self._now = command, None
+        self._plant.advance(command, self._senses.actuate(command), note.limiter)
+        self.ended = Ending(Outcome.COLLIDED) if self._plant.touched else note.ending
+        if self.ended is None:
+            self.tick += 1
+            self.ended = self._timed_out()
+
+    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+        """Return the scans, and for a robot with noise the estimates and the motor targets.
+
+        The error of an estimate stays constant within a control period.
+        """
+        scans = self._lidar.logged(log, per_tick) if self._lidar else {}
+        if not self._senses.noisy:
+            return scans
+        errors = [
+            (x - true_x, y - true_y, math.remainder(yaw - true_yaw, 2 * math.pi))
+            for (x, y, yaw), (true_x, true_y, true_yaw) in zip(
+                self.estimates, log.pose[::per_tick].tolist(), strict=False
+            )
+        ]
+        period = np.minimum(np.arange(len(log.t)) // per_tick, max(len(errors) - 1, 0))
+        return scans | {"estimate": log.pose + np.array(errors or [(0.0, 0.0, 0.0)])[period], "actuated": log.actuated}
+
+    def _arrived(self, believed: Pose, twist: Twist) -> bool:
+        """Return whether the robot stands at the goal by its estimate, once it has had a command."""
+        task = self._task
+        if task is None or not self.tick:
+            return False
+        return arrived(believed, twist, self._command, task.goal, task.goal_tolerance)
+
+    def _timed_out(self) -> Ending | None:
+        return Ending(Outcome.TIMED_OUT) if self.tick >= self._periods else None
+
+    def _judged(self, believed: Pose) -> Ending:
+        """Return the ending of a robot that stands without contact and believes to be at a pose."""
+        task, true = self._task, self._plant.state.pose
+        assert task is not None
+        left, off = math.dist(true[:2], task.goal), math.dist(believed[:2], task.goal)
+        outcome = outcome_at(true, task.goal, task.goal_tolerance)
+        if outcome is Outcome.SUCCEEDED:
+            return Ending(outcome)
+        why = f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
+        if off <= task.goal_tolerance:
+            why = (
+                f"the robot believed that it was at the goal, {off:.2f} m from it, but was {left:.3f} m from it "
+                f"(the tolerance is {task.goal_tolerance:g} m): its estimate was wrong by "
+                f"{math.dist(believed[:2], true[:2]):.2f} m"
+            )
+        return Ending(outcome, why)

@@ -1,0 +1,129 @@
+"""Driver: follow the guide, apply the rules, arrive or give up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from antdrive.base import Pose
+from antdrive.robots import LIMITERS, PursuitState, RobotSpec, Twist
+from antdrive.robots.control.observation import Briefing, Observation
+from antdrive.robots.noise import moved_by
+from antdrive.sim.driving.guide import Follow, GiveUp, Guide, Moment, Rule, Wait
+from antdrive.sim.driving.parts import EXPLORING_LIMITERS, Ending, Note, Rows, Step, StuckClock
+from antdrive.sim.driving.perceived_movers import Given
+from antdrive.sim.driving.rules import WAITING_SPEED
+from antdrive.sim.driving.survey import Scans
+from antdrive.sim.log.ending import STUCK_TIME, arrived, stopped
+from antdrive.sim.log.outcome import Outcome
+
+PROGRESS_HZ = 10  # reports of progress per simulated second
+
+
+class Driver:
+    """Mind that drives a robot along a path, one step per control period.
+
+    Attributes:
+        briefing: what the robot knows before the drive
+        guide: provides the path
+        rules: compute the command, in order
+        scans: reads the lidar; None: unused
+        way: the current way
+        step: the current step
+        progress_periods: control periods between two reports of progress
+    """
+
+    way: Follow
+
+    def __init__(
+        self,
+        briefing: Briefing,
+        guide: Guide,
+        rules: Sequence[Rule],
+        scans: Scans | None = None,
+        given: Given | None = None,
+    ) -> None:
+        self.briefing, self.guide, self.rules, self.scans, self.step = briefing, guide, tuple(rules), scans, Step()
+        self._given, self._clock, self._hz = given, StuckClock(), briefing.hz
+        self._patience = round(STUCK_TIME * briefing.hz)
+        self._full_turn = full_turn(briefing.robot, briefing.hz)
+        self.progress_periods = briefing.hz // PROGRESS_HZ or 1
+
+    @property
+    def fraction(self) -> float:
+        """Completed fraction of the route."""
+        return self.step.pursuit.arc / self.way.path.length
+
+    def act(self, now: Observation) -> tuple[Twist | None, Note]:
+        """Return the command of one control period, None to stay where the robot stands, and a note on it."""
+        guide, known, before, believed = self.guide, self.briefing, self.step, now.pose
+        if now.scan is not None and self.scans is not None:
+            believed = self.scans.read(now.tick, believed, now.scan)
+        if self._given is not None:
+            self._given.read(now.movers)
+        silent = Note(believed)
+        if now.tick and arrived(believed, now.twist, before.command, known.goal, known.tolerance):
+            return None, silent
+        pose = moved_by(believed, now.pending, 1 / self._hz)
+        waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
+        seen = now._replace(pose=pose)
+        moment = Moment(seen, self.way, before, self._clock, waiting)
+        answer = guide.path(moment)
+        if isinstance(answer, GiveUp):
+            return None, silent._replace(ending=answer.ending)
+        self._follow(answer)
+        moment, step = Moment(seen, self.way, self.step, self._clock), self.step
+        for rule in self.rules:
+            step = rule.apply(moment, step)
+        self.step = step
+        if self._at_end_of_route(pose, now.twist, before.command):
+            answer = guide.path(moment, at_end=True)
+            if isinstance(answer, GiveUp):
+                return None, silent._replace(ending=answer.ending)
+            self._follow(answer)
+        turns = isinstance(self.way, Wait) and self.way.scan_turn is not None
+        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or turns)
+        return step.command, Note(believed, step.pursuit.limiter, self._gives_up())
+
+    @property
+    def limiters(self) -> tuple[str, ...]:
+        """Names of the rules that limit the speed."""
+        return EXPLORING_LIMITERS if self.briefing.map is None else LIMITERS
+
+    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+        """Return what guide and mover tracking add to a log."""
+        tracking = self.scans.tracking if self.scans else None
+        return self.guide.logged(log, per_tick) | (tracking.logged(log, per_tick) if tracking else {})
+
+    def _gives_up(self) -> Ending | None:
+        """End the drive of a robot without progress. Turning on the spot adds the time of a full turn to the limit."""
+        clock = self._clock
+        if clock.driving < self._patience and clock.turning < self._patience + self._full_turn:
+            return None
+        return Ending(Outcome.STUCK, clock.reason)
+
+    def with_reason(self, ending: Ending, tick: int) -> Ending:
+        """Add the guide's failure note to the reason of a robot that got stuck or timed out."""
+        if ending.outcome not in (Outcome.STUCK, Outcome.TIMED_OUT):
+            return ending
+        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self.guide.failure_note(tick)))))
+
+    def _follow(self, way: Follow) -> None:
+        """Follow a way, whose route may be new."""
+        if way.path.route is not self.way.path.route:
+            self.step = self.step._replace(pursuit=PursuitState(limiter=self.step.pursuit.limiter))
+            self._clock = self._clock._replace(farthest=0.0)
+        self.way = way
+
+    def _at_end_of_route(self, pose: Pose, twist: Twist, last: Twist) -> bool:
+        """Return whether the robot stands at the end of its route, and not at the goal, where it arrives in the next period."""
+        path, (command, pursuit, *_), known = self.way.path, self.step, self.briefing
+        if path.length - pursuit.arc > path.goal_distance or any(command) or not stopped(twist, last):
+            return False
+        return math.dist(pose[:2], known.goal) > known.tolerance
+
+
+def full_turn(robot: RobotSpec, hz: int) -> int:
+    """Return the number of control periods of a full turn on the spot."""
+    return round(2 * math.pi / robot.max_yaw_rate * hz)
