@@ -229,7 +229,7 @@ def test_an_invalid_option_is_named(options, message):
 def test_an_invalid_action_is_refused(action):
     env = NavigationEnv("world", source=OPEN)
     env.reset(seed=0)
-    with pytest.raises(InputError, match="^actions?: must"):
+    with pytest.raises(InputError, match=r"^actions?: must"):
         env.step(action)
 
 

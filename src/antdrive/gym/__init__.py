@@ -1,6 +1,11 @@
 """Gymnasium environments: point-goal navigation among the worlds of this package, and the registration of their ids."""
 
+import lazy_loader
+
 from antdrive.base.optional import optional
+
+# __init__.pyi lists the exports with their types; each name is imported on first use.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 _gymnasium = optional("gymnasium", "gym", "environments for learning need it")
 

@@ -19,6 +19,8 @@ PER_BIT = 1.0 / 9007199254740992.0  # 2^-53
 STOPPED_SPEED = 0.01  # [m/s], [rad/s]; log/ending.py has the same
 STANDING_SPEED = 0.02  # [m/s]; log/contacts.py has the same
 TOUCHING = 1e-4  # [m]; robots/clearance.py has the same
+SLIP_TIME = 0.5  # [s]; robots/noise.py has the same
+FARTHEST = 20.0  # distance of a goal that is observed as 1 [m]
 LEAP = 20.0  # a mover that is faster has jumped [m/s]; worlds/limits.py has the same
 DRIVING, SUCCEEDED, STUCK, COLLIDED, HIT_WHILE_STANDING, HIT_BY_TELEPORT = 0, 1, 2, 3, 4, 5
 # Columns of `Robots.state`: true pose and twist, command in force, estimated pose, slip of both wheels, and a lower bound
@@ -153,7 +155,7 @@ def move(i: int, body: Body, robots: Robots, maps: Maps) -> int:
         robots.pending[i, slot, 0], robots.pending[i, slot, 1] = speed, turn
         speed, turn = late_speed, late_turn
     if noise[3] > 0.0:
-        keep = math.exp(-period / 0.5)  # SLIP_TIME
+        keep = math.exp(-period / SLIP_TIME)
         fresh = noise[3] * math.sqrt(1.0 - keep * keep)
         state[SLIP] = keep * state[SLIP] + fresh * normal(i, robots.random)
         state[SLIP + 1] = keep * state[SLIP + 1] + fresh * normal(i, robots.random)
@@ -206,9 +208,7 @@ def hit(i: int, share: float, fastest: float, body: Body, robots: Robots, maps: 
 
 
 @leaf
-def mover_at(
-    i: int, m: int, share: float, robots: Robots, maps: Maps, hz: int
-) -> tuple[float, float, float, bool]:
+def mover_at(i: int, m: int, share: float, robots: Robots, maps: Maps, hz: int) -> tuple[float, float, float, bool]:
     """Return a mover's position at a part of the control period, its speed, and whether it jumps in the period."""
     row = maps.rows[robots.world[i]]
     at = row[6] + 2 * (row[5] * robots.tick[i] + m)
@@ -303,9 +303,6 @@ def look(i: int, body: Body, robots: Robots, maps: Maps) -> None:
     robots.facts[i, DISTANCE] = math.hypot(robots.goal[i, 0] - state[X], robots.goal[i, 1] - state[Y])
     for k in range(COLUMNS - 1):
         robots.digest[i] = next_random(robots.digest[i] ^ robots.bits[i, k])
-
-
-FARTHEST = 20.0  # distance of a goal that is observed as 1 [m]
 
 
 @leaf

@@ -7,7 +7,6 @@ from collections.abc import Hashable
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base.errors import InputError
 from antdrive.base.types import Flags, Floats
@@ -35,7 +34,7 @@ class Episode(NamedTuple):
     """All that an episode depends on."""
 
     task: Task
-    key: Hashable  # of the world: worlds with equal keys are equal
+    key: Hashable  # of the world and its movers' motions: those with equal keys are equal
     seed: int  # of its random numbers
     noise: float  # factor on the robot's documented noise
 
@@ -91,10 +90,7 @@ class KinematicPlant:
         )
         self.tasks: list[Task | None] = [None] * number
         self._known: dict[Hashable, int] = {}
-        self._maps = kernels.Maps(
-            np.empty((0, 7), dtype=np.int64), np.empty((0, 4)), *(np.empty(0) for _ in range(4))
-        )
-        self._rows = list[tuple[int, ...]]()
+        self._maps = kernels.Maps(np.empty((0, 7), dtype=np.int64), np.empty((0, 4)), *(np.empty(0) for _ in range(4)))
 
     def place(self, i: int, episode: Episode) -> None:
         """Put robot i at the start of an episode, and observe."""
@@ -140,21 +136,15 @@ class KinematicPlant:
         movers = Trajectories.of(world, task.start[:2])
         radii = np.where(movers.heights >= eye, movers.radii, -movers.radii) if len(movers) else np.empty(0)
         tracks = movers.positions(np.arange(self._periods if len(movers) else 0) / CONTROL_HZ)
-        used = self._used()
-        self._rows.append((used[0], len(discs), used[1], len(visible), used[2], len(radii), used[3]))
-        parts = (discs.ravel(), np.ascontiguousarray(visible.T).ravel(), radii, tracks.ravel())
+        parts = (discs.ravel(), visible.T.ravel(), radii, tracks.ravel())
         old = (maps.discs, maps.visible, maps.radii, maps.tracks)
-        grown = [_with(flat, size, part) for flat, size, part in zip(old, used, parts, strict=True)]
-        rows, index = _with(maps.rows.ravel(), 7 * (len(self._rows) - 1), np.array(self._rows[-1])), len(self._rows)
-        bounds = _with(maps.bounds.ravel(), 4 * (index - 1), np.array(world.bounds, dtype=np.float64))
-        self._maps = kernels.Maps(rows.reshape(-1, 7), bounds.reshape(-1, 4), *grown)
-
-    def _used(self) -> tuple[int, int, int, int]:
-        """Return how much of each flat array is in use."""
-        if not self._rows:
-            return 0, 0, 0, 0
-        first, discs, seen, visible, radii, movers, tracks = self._rows[-1]
-        return first + 3 * discs, seen + 3 * visible, radii + movers, tracks + 2 * movers * self._periods
+        first, seen, mover, track = map(len, old)
+        row = (first, len(discs), seen, len(visible), mover, len(radii), track)
+        self._maps = kernels.Maps(
+            np.vstack((maps.rows, row)),
+            np.vstack((maps.bounds, world.bounds)),
+            *map(np.concatenate, zip(old, parts, strict=True)),
+        )
 
 
 def _body(robot: RobotSpec, lidar: Lidar) -> Any:
@@ -171,18 +161,9 @@ def _body(robot: RobotSpec, lidar: Lidar) -> Any:
     )
 
 
-def _with(flat: npt.NDArray[Any], used: int, part: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return an array with values written behind the used ones; it doubles when it is full."""
-    if used + len(part) > len(flat):
-        flat = np.concatenate((flat[:used], np.zeros(max(len(part), used), dtype=flat.dtype)))
-    flat[used : used + len(part)] = part
-    return flat
-
-
 def _mixed(seed: int) -> int:
     """Return a seed of a kernel's random numbers, never 0: the splitmix64 hash of a whole number."""
     value = (seed + 0x9E3779B97F4A7C15) % 2**64
     value = (value ^ value >> 30) * 0xBF58476D1CE4E5B9 % 2**64
     value = (value ^ value >> 27) * 0x94D049BB133111EB % 2**64
     return (value ^ value >> 31) or 1
-

@@ -74,7 +74,7 @@ def task_of(world: Source, robot: RobotSpec | None = None, **ends: Any) -> Task:
     """
     task = world if isinstance(world, Task) else load_task(world)
     try:
-        given = {key: tuple(map(float, value)) for key, value in ends.items() if value is not None}
+        given: dict[str, Any] = {key: tuple(map(float, value)) for key, value in ends.items() if value is not None}
         for key, value in given.items():
             if len(value) != (3 if key == "start" else 2):
                 raise FieldError(key, f"must be {'x, y and yaw' if key == 'start' else 'x and y'}, got {value}")
@@ -92,7 +92,9 @@ def task_of(world: Source, robot: RobotSpec | None = None, **ends: Any) -> Task:
 def repeated(task: Task, number: int) -> Task:
     """Return a task whose wandering movers have seeds, made from its number: each of its episodes has the same movers."""
     movers = tuple(
-        dataclasses.replace(mover, seed=1000 * number + i) if isinstance(mover, Wandering) and mover.seed is None else mover
+        dataclasses.replace(mover, seed=1000 * number + i)
+        if isinstance(mover, Wandering) and mover.seed is None
+        else mover
         for i, mover in enumerate(task.world.movers)
     )
     if movers == task.world.movers:

@@ -28,8 +28,8 @@ class NavigationEnv(gymnasium.Env[Any, Any]):
     metadata = METADATA
 
     def __init__(self, course: str = "forest", render_mode: str | None = None, **arguments: Any) -> None:
-        mode = {"autoreset_mode": AutoresetMode.DISABLED, "render_mode": render_mode}
-        self._batch = NavigationVectorEnv(1, course, **arguments, **mode)
+        arguments |= {"autoreset_mode": AutoresetMode.DISABLED, "render_mode": render_mode}
+        self._batch = NavigationVectorEnv(1, course, **arguments)
         self.render_mode = render_mode
         self.observation_space = self._batch.single_observation_space
         self.action_space = self._batch.single_action_space
@@ -42,7 +42,11 @@ class NavigationEnv(gymnasium.Env[Any, Any]):
         return _single(observation), _single(info)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Drive for one action (2,)."""
+        """Drive for one `action` (2,).
+
+        Raises:
+            InputError: the action has another shape, or is not finite.
+        """
         wanted = np.asarray(action)
         if wanted.shape != (2,):
             raise InputError(f"action: must have shape (2,), got {wanted.shape}")

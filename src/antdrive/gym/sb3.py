@@ -15,7 +15,7 @@ from antdrive.gym.vector import NavigationVectorEnv
 _vec_env = optional("stable_baselines3.common.vec_env", "gym", "install stable-baselines3, too")
 
 
-class NavigationVecEnv(_vec_env.VecEnv):  # type: ignore[misc]  # stable-baselines3 is not installed where types are checked
+class NavigationVecEnv(_vec_env.VecEnv):  # type: ignore[misc,name-defined]  # stable-baselines3 may be missing
     """A `VecEnv` of stable-baselines3 around robots that begin their next episode by themselves.
 
     >>> model = PPO("MultiInputPolicy", NavigationVecEnv(64, "forest", noise=1.0), n_steps=128)

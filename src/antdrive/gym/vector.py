@@ -17,14 +17,14 @@ from antdrive.base.errors import InputError
 from antdrive.base.types import Flags, Floats
 from antdrive.gym.batch import ACTION_HZ, ENDINGS, Episode, KinematicPlant, thinned
 from antdrive.gym.courses import Source, course_of, repeated, task_of
-from antdrive.gym.painter import Painter
-from antdrive.gym.rewards import Facts, Reward, Rule, terms_of
+from antdrive.gym.rewards import NEAR, Facts, Rule, terms_of
 from antdrive.robots import RobotSpec, load_robot
 from antdrive.sim.log.outcome import Outcome
 from antdrive.worlds import Task
 
 KEYS = np.array(["" if ending is None else ending.key for ending in ENDINGS] + [Outcome.TIMED_OUT.key])
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": ACTION_HZ}
+PICTURE = (480, 360)  # width and height [px]
 OPTIONS = ("world", "start", "goal", "noise", "reset_mask")  # of `reset`
 
 
@@ -48,7 +48,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         beams: number of the lidar's beams
         reach: the lidar's longest range, at most that of the robot's own [m]
         steps: largest number of actions in an episode, ten a second
-        reward: weights of `Reward` by name, or a function of `Facts`
+        reward: other `WEIGHTS` by name, or a function of `Facts`
         flat: whether an observation is one vector: scan, goal, velocity
         worlds: number of generated worlds
         source: the world, or the file or folder of a set of worlds
@@ -91,13 +91,13 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         self._robot = thinned(robot if isinstance(robot, RobotSpec) else load_robot(robot), beams, reach)
         self._course = course_of(course, self._robot, worlds, source, options)
         self._noise, self._limit, self._flat, self._beams = _factor(noise), steps, flat, beams
-        self._terms = terms_of(Reward() if reward == {} else reward)
+        self._terms = terms_of(reward)
         self._plant = plant_of(plant)(self._robot, num_envs, steps)
         self._tasks: dict[int, Task] = {}
         self.rngs = list[np.random.Generator]()  # one for each robot
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._over = np.ones(num_envs, dtype=np.bool_)
-        self._painters: dict[int, Painter] = {}
+        self._painters: dict[int, tuple[Task, Any]] = {}  # of each robot
         self.single_observation_space = _observations(beams, flat)
         self.single_action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -123,7 +123,11 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         chosen = np.array(options.get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
         if chosen.shape != (self.num_envs,) or chosen.dtype != np.bool_:
             raise InputError(f"options: reset_mask must be {self.num_envs} booleans")
-        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, Sequence) else seed
+        seeds = (
+            [None if seed is None else seed + i for i in range(self.num_envs)]
+            if not isinstance(seed, Sequence)
+            else seed
+        )
         if len(seeds) != self.num_envs:
             raise InputError(f"seed: must be one for each of {self.num_envs} robots, got {len(seeds)}")
         fresh = not self.rngs
@@ -186,26 +190,22 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         task, plant = self._plant.tasks[i], self._plant
         if task is None:
             raise ResetNeeded("call reset before render")
-        painter = self._painters.get(i)
-        if painter is None or painter.task is not task:
-            painter = self._painters[i] = Painter(task, self._robot)
-        return painter.picture(plant.robots.state[i, :3], plant.movers(i))
+        if self._painters.get(i, (None, None))[0] is not task:
+            self._painters[i] = task, compositor_of(task, self._robot)
+        return self._painters[i][1].frame(plant.robots.state[i, :3], movers=plant.movers(i))
 
     def _begin(self, i: int, options: Mapping[str, Any] = MappingProxyType({})) -> None:
         """Put robot i at the start of its next episode."""
         number, seed = int(self.rngs[i].integers(self._course.count)), int(self.rngs[i].integers(2**63))
-        given, key = options.get("world"), number
-        if given is None:
-            if number not in self._tasks:
-                self._tasks[number] = task_of(repeated(self._course.task(number), number), self._robot)
-            task = self._tasks[number]
-        else:
-            task = repeated(task_of(given), 0)
-        ends = {key: options.get(key) for key in ("start", "goal")}
-        if given is not None or any(end is not None for end in ends.values()):
+        world, ends = options.get("world"), {key: options.get(key) for key in ("start", "goal")}
+        if world is None and number not in self._tasks:
+            self._tasks[number] = task_of(repeated(self._course.task(number), number), self._robot)
+        task = self._tasks[number] if world is None else repeated(task_of(world), 0)
+        if world is not None or any(end is not None for end in ends.values()):
             task = task_of(task, self._robot, **ends)
+        key = number if world is None else task.world, task.start if task.world.movers else None
         noise = self._noise if options.get("noise") is None else _factor(options["noise"])
-        self._plant.place(i, Episode(task, key if given is None else task.world, seed, noise))
+        self._plant.place(i, Episode(task, key, seed, noise))
         self._steps[i], self._over[i] = 0, False
 
     def _observation(self) -> Any:
@@ -246,9 +246,6 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         return info
 
 
-NEAR = Reward.near_distance  # an action that ends nearer to a surface has a cost of 1 [m]
-
-
 def plant_of(name: str) -> type[KinematicPlant]:
     """Return the class of a plant."""
     if name == "bullet":
@@ -256,6 +253,17 @@ def plant_of(name: str) -> type[KinematicPlant]:
     if name != "kinematic":
         raise InputError(f"plant: unknown {name!r}; choose kinematic or bullet")
     return KinematicPlant
+
+
+def compositor_of(task: Task, robot: RobotSpec) -> Any:
+    """Return the films' compositor of a task without a plan."""
+    from antdrive.views.film.camera import camera_for
+    from antdrive.views.film.compositor import Compositor, drawn_height
+    from antdrive.views.scene import Scene
+
+    scene = Scene.running(task, robot)
+    camera = camera_for("oblique", scene.bounds[:2], scene.bounds[2:], drawn_height(scene), PICTURE)
+    return Compositor(scene, camera, route=np.empty((0, 2)))
 
 
 def _factor(noise: Any) -> float:
@@ -271,7 +279,10 @@ def _masked(values: Mapping[str, Any], mask: Flags) -> dict[str, Any]:
 
 def _observations(beams: int, flat: bool) -> spaces.Space[Any]:
     low = {"scan": np.zeros(beams), "goal": np.array((0.0, -1.0, -1.0)), "velocity": np.array((-1.0, -1.0))}
-    boxes = {key: spaces.Box(value.astype(np.float32), np.float32(1.0), value.shape, np.float32) for key, value in low.items()}
+    boxes: dict[str, spaces.Space[Any]] = {
+        key: spaces.Box(value.astype(np.float32), np.float32(1.0), value.shape, np.float32)
+        for key, value in low.items()
+    }
     if not flat:
         return spaces.Dict(boxes)
     lows = np.concatenate(list(low.values())).astype(np.float32)
