@@ -8,7 +8,8 @@ import pytest
 
 from antdrive.gym import _kernels_batch as kernels
 from antdrive.gym.batch import CONTROL_HZ, PHYSICS_HZ, Episode, KinematicPlant, thinned
-from antdrive.robots import Footprint, NoiseModel, Twist, footprint_clearance, load_robot
+from antdrive.robots import Footprint, footprint_clearance, load_robot
+from antdrive.robots.noise import SLIP_TIME
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, generate
@@ -67,42 +68,52 @@ def test_rays_and_clearance_are_those_of_the_scanner_and_the_footprint(name):
     assert step > 20
 
 
-class SameNumbers:
-    """A generator whose normal numbers are those of a robot of the plant."""
-
-    def __init__(self, seed_of_plant):
-        self._state = seed_of_plant.copy()
-
-    def standard_normal(self, count):
-        return np.array([kernels.normal(0, self._state) for _ in range(count)])
+def moved(pose, speed, turn, time):
+    middle = pose[2] + turn * time / 2
+    return np.add(pose, (speed * math.cos(middle) * time, speed * math.sin(middle) * time, turn * time))
 
 
-def test_slip_delay_and_estimate_are_those_of_the_drives_noise():
-    robot = EXACT  # a scan without noise draws nothing
-    plant = KinematicPlant(robot, 1, 500)
+def test_slip_delay_odometry_and_fixes_follow_their_equations():
+    """The model of antdrive.robots.noise, written down once more, with the plant's own random numbers."""
+    levels, half, period = EXACT.noise, EXACT.track / 2, 1 / CONTROL_HZ
     task = Task(World("open", (0.0, 0.0, 40.0, 40.0)), (20.0, 20.0, 0.5), (39.0, 39.0))
-    begin = KinematicPlant(robot, 1, 500)
-    begin.place(0, Episode(task, 0, 3, 0.0))  # the same seed, before any number is drawn
-    plant.place(0, Episode(task, 0, 3, 1.0))
-    model = NoiseModel(robot.noise, robot.track, 1 / CONTROL_HZ, task.start, SameNumbers(begin.robots.random))
-    pose, twist, command = task.start, Twist(0.0, 0.0), Twist(0.0, 0.0)
-    limits = plant._body.limits
-    model.estimate_pose(pose, twist)
+    numbers, plant = plant_at(task).robots.random.copy(), plant_at(task, noise=1.0)  # without noise nothing is drawn
+
+    def normals(count):
+        return np.array([kernels.normal(0, numbers) for _ in range(count)])
+
+    def fixed(estimate):
+        return pose + normals(3) * (levels.pose_xy, levels.pose_xy, levels.pose_yaw) - estimate
+
+    pose, rims, slip, command = np.array(task.start), np.zeros(2), np.zeros(2), (0.0, 0.0)
+    delayed, keep = [(0.0, 0.0)] * round(levels.delay / period), math.exp(-period / SLIP_TIME)
+    gain_xy, gain_yaw = plant.robots.noise[0, 4:6]
+    normals(2)
+    estimate = pose + (gain_xy, gain_xy, gain_yaw) * fixed(pose)
+    tick, limits = 0, plant._body.limits
     for action, state in zip(wandering(40), driven(plant, wandering(40)), strict=True):
         for _ in range(CONTROL_HZ // 10):
-            command = Twist(*kernels.limited(*command, *action, 1 / CONTROL_HZ, limits))
-            twist = model.actuate(command)
+            command = kernels.limited(*command, *action, period, limits)
+            delayed.append(command)
+            speed, turn = delayed.pop(0)
+            slip = keep * slip + levels.slip * math.sqrt(1 - keep**2) * normals(2)
+            rims = np.array((speed - turn * half, speed + turn * half)) * (1 + slip)
             for _ in range(PHYSICS_HZ // CONTROL_HZ):
-                middle = pose[2] + twist.yaw_rate / PHYSICS_HZ / 2
-                x, y = (
-                    pose[k] + twist.speed * turn(middle) / PHYSICS_HZ for k, turn in enumerate((math.cos, math.sin))
-                )
-                pose = x, y, pose[2] + twist.yaw_rate / PHYSICS_HZ
-            model.estimate_pose(pose, twist)
+                pose = moved(pose, rims.mean(), (rims[1] - rims[0]) / (2 * half), 1 / PHYSICS_HZ)
+            tick += 1
+            rolled = rims / (1 + slip) * (1 + levels.encoder * normals(2))
+            estimate = moved(estimate, rolled.mean(), (rolled[1] - rolled[0]) / (2 * half), period)
+            error = fixed(estimate)
+            estimate = estimate + (gain_xy, gain_xy, gain_yaw) * error * (
+                tick % round(CONTROL_HZ / levels.pose_rate) == 0
+            )
         assert state[:3] == pytest.approx(pose, abs=1e-9)
-        assert state[kernels.BELIEVED : kernels.BELIEVED + 3] == pytest.approx(model.estimate, abs=1e-9)
-        away = np.subtract(task.goal, model.pose_after_delay()[:2])
-        assert plant.robots.seen[0, 64] == pytest.approx(min(math.hypot(*away) / kernels.FARTHEST, 1.0), abs=1e-9)
+        assert state[kernels.BELIEVED : kernels.BELIEVED + 3] == pytest.approx(estimate, abs=1e-9)
+        ahead = estimate
+        for speed, turn in delayed:
+            ahead = moved(ahead, speed, turn, period)
+        away = math.dist(ahead[:2], task.goal)
+        assert plant.robots.seen[0, 64] == pytest.approx(min(away / kernels.FARTHEST, 1.0), abs=1e-9)
 
 
 def test_commands_keep_every_limit_of_the_robot():
@@ -189,7 +200,6 @@ def test_worlds_that_come_later_change_no_other():
 
 def test_constants_are_those_of_the_rules_that_they_repeat():
     from antdrive.robots.clearance import TOUCHING
-    from antdrive.robots.noise import SLIP_TIME
     from antdrive.sim.log import contacts, ending
     from antdrive.worlds import limits
 

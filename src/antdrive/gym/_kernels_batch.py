@@ -262,8 +262,8 @@ def moved(x: float, y: float, yaw: float, speed: float, turn: float, time: float
 
 @kernel
 def look(i: int, body: Body, robots: Robots, maps: Maps) -> None:
-    """Write a robot's observation: scan, goal from where its next command takes effect, and twist; and what is true."""
-    state, world, seen, limits = robots.state[i], robots.world[i], robots.seen[i], body.limits
+    """Write what a robot observes, and what is true."""
+    state, world, seen = robots.state[i], robots.world[i], robots.seen[i]
     row, count = maps.rows[world], body.beams.shape[1]
     state[FREE] = clearance = static_gap(i, body, robots, maps)
     movers = np.empty((3, row[5]))
@@ -288,6 +288,17 @@ def look(i: int, body: Body, robots: Robots, maps: Maps) -> None:
     )  # fmt: skip
     for k in range(count):
         seen[k] = min(max(out[k] / body.ranges[1], 0.0), 1.0)
+    see(i, body, robots)
+    robots.facts[i, CLEARANCE] = clearance
+    robots.facts[i, DISTANCE] = math.hypot(robots.goal[i, 0] - state[X], robots.goal[i, 1] - state[Y])
+    for k in range(COLUMNS - 1):
+        robots.digest[i] = next_random(robots.digest[i] ^ robots.bits[i, k])
+
+
+@leaf
+def see(i: int, body: Body, robots: Robots) -> None:
+    """Write a robot's observation beside the scan: the goal from where its next command takes effect, and its twist."""
+    state, seen, count, limits = robots.state[i], robots.seen[i], body.beams.shape[1], body.limits
     x, y, yaw = state[BELIEVED], state[BELIEVED + 1], state[BELIEVED + 2]
     delay = robots.timing[i, 0]
     for k in range(delay):
@@ -299,10 +310,6 @@ def look(i: int, body: Body, robots: Robots, maps: Maps) -> None:
     seen[count + 1], seen[count + 2] = math.cos(bearing), math.sin(bearing)
     seen[count + 3] = min(max(state[SPEED] / limits[0], -1.0), 1.0)
     seen[count + 4] = min(max(state[TURN] / limits[1], -1.0), 1.0)
-    robots.facts[i, CLEARANCE] = clearance
-    robots.facts[i, DISTANCE] = math.hypot(robots.goal[i, 0] - state[X], robots.goal[i, 1] - state[Y])
-    for k in range(COLUMNS - 1):
-        robots.digest[i] = next_random(robots.digest[i] ^ robots.bits[i, k])
 
 
 @leaf

@@ -13,7 +13,7 @@ from antdrive.base.types import Flags, Floats
 from antdrive.gym import _kernels_batch as kernels
 from antdrive.robots import Lidar, RobotSpec
 from antdrive.robots.clearance import kernel_shape
-from antdrive.robots.noise import fix_gains
+from antdrive.robots.noise import steady_errors
 from antdrive.sim.log.outcome import Outcome
 from antdrive.worlds import Task, Trajectories
 
@@ -105,7 +105,8 @@ class KinematicPlant:
             self._add(task)
         self.tasks[i], robots.world[i] = task, self._known.setdefault(episode.key, len(self._known))
         robots.goal[i] = (*task.goal, task.goal_tolerance)
-        gains = fix_gains(levels, spec.track)
+        errors = zip(steady_errors(levels, spec.track), (levels.pose_xy, levels.pose_yaw), strict=True)
+        gains = [(steady / fix) ** 2 if fix else 1.0 for steady, fix in errors]
         robots.noise[i] = (levels.pose_xy, levels.pose_yaw, levels.encoder, levels.slip, *gains, episode.noise)
         robots.timing[i] = round(levels.delay * CONTROL_HZ), max(1, round(CONTROL_HZ / levels.pose_rate))
         kernels.place(i, self._body, robots, self._maps)
@@ -113,6 +114,9 @@ class KinematicPlant:
     def drive(self, chosen: Flags, actions: Floats) -> None:
         """Drive the chosen robots for one action each (N, 2), in parts of the highest speed and yaw rate."""
         kernels.drive(chosen, actions, self._body, self.robots, self._maps)
+
+    def leave(self, i: int) -> None:
+        """End the episode of robot i; nothing is open."""
 
     def outcome(self, i: int) -> Outcome | None:
         """Return how an episode ended; None while it goes on."""

@@ -58,6 +58,10 @@ class NavigationEnv(gymnasium.Env[Any, Any]):
         pictures = self._batch.render()
         return None if pictures is None else pictures[0]
 
+    def close(self) -> None:
+        """End the drive in physics."""
+        self._batch.close()
+
 
 def _single(values: Any) -> Any:
     """Return the only robot's part of what a vector environment returns, without masks."""

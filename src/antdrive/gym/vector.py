@@ -186,6 +186,11 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
             return None
         return tuple(self._picture(i) for i in range(self.num_envs))
 
+    def close_extras(self, **kwargs: Any) -> None:
+        """End the drives in physics."""
+        for i in range(self.num_envs):
+            self._plant.leave(i)
+
     def _picture(self, i: int) -> Any:
         task, plant = self._plant.tasks[i], self._plant
         if task is None:
@@ -196,7 +201,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _begin(self, i: int, options: Mapping[str, Any] = MappingProxyType({})) -> None:
         """Put robot i at the start of its next episode."""
-        number, seed = int(self.rngs[i].integers(self._course.count)), int(self.rngs[i].integers(2**63))
+        number, seed = int(self.rngs[i].integers(self._course.count)), int(self.rngs[i].integers(2**32))
         world, ends = options.get("world"), {key: options.get(key) for key in ("start", "goal")}
         if world is None and number not in self._tasks:
             self._tasks[number] = task_of(repeated(self._course.task(number), number), self._robot)
@@ -249,7 +254,9 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
 def plant_of(name: str) -> type[KinematicPlant]:
     """Return the class of a plant."""
     if name == "bullet":
-        raise InputError("plant: bullet is not available yet; use kinematic, and drive in physics with `antdrive run`")
+        from antdrive.gym.physics import PhysicsPlant
+
+        return PhysicsPlant
     if name != "kinematic":
         raise InputError(f"plant: unknown {name!r}; choose kinematic or bullet")
     return KinematicPlant

@@ -47,7 +47,7 @@ class NoiseModel:
         self._tick = 0
         self.estimate = start
         self.encoders = self.odometry = Twist(0.0, 0.0)
-        self._gain = fix_gains(noise, track)
+        self._gain = _gains(noise, track)
 
     def estimate_pose(self, pose: Pose, twist: Twist) -> Pose:
         """Return the estimated pose for a true `pose` and a true velocity `twist`.
@@ -113,11 +113,11 @@ def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
 
 def steady_errors(noise: Noise, track: float) -> tuple[float, float]:
     """Return the standard deviations of the estimate in x or y [m] and in heading [rad] at 1 m/s; `track` is in metres."""
-    gain_xy, gain_yaw = fix_gains(noise, track)
+    gain_xy, gain_yaw = _gains(noise, track)
     return math.sqrt(gain_xy) * noise.pose_xy, math.sqrt(gain_yaw) * noise.pose_yaw
 
 
-def fix_gains(noise: Noise, track: float) -> tuple[float, float]:
+def _gains(noise: Noise, track: float) -> tuple[float, float]:
     """Return the gains of pose fixes for the position and the heading."""
     # Variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors add up over fixes.
     correlated = max(1.0, 2 * SLIP_TIME * noise.pose_rate)
