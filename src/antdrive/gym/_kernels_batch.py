@@ -260,20 +260,30 @@ def moved(x: float, y: float, yaw: float, speed: float, turn: float, time: float
     return x + speed * math.cos(middle) * time, y + speed * math.sin(middle) * time, yaw + turn * time
 
 
+@leaf
+def note(i: int, body: Body, robots: Robots, maps: Maps) -> None:
+    """Write a robot's true distances from all surfaces and from its goal."""
+    state, row = robots.state[i], maps.rows[robots.world[i]]
+    state[FREE] = clearance = static_gap(i, body, robots, maps)
+    for m in range(row[5]):
+        x, y, _, _ = mover_at(i, m, 0.0, robots, maps, body.rates[2])
+        clearance = min(clearance, mover_gap(x, y, abs(maps.radii[row[4] + m]), state, body))
+    robots.facts[i, CLEARANCE] = clearance
+    robots.facts[i, DISTANCE] = math.hypot(robots.goal[i, 0] - state[X], robots.goal[i, 1] - state[Y])
+
+
 @kernel
 def look(i: int, body: Body, robots: Robots, maps: Maps) -> None:
     """Write what a robot observes, and what is true."""
+    note(i, body, robots, maps)
     state, world, seen = robots.state[i], robots.world[i], robots.seen[i]
     row, count = maps.rows[world], body.beams.shape[1]
-    state[FREE] = clearance = static_gap(i, body, robots, maps)
     movers = np.empty((3, row[5]))
     shown = 0
     for m in range(row[5]):
-        x, y, _, _ = mover_at(i, m, 0.0, robots, maps, body.rates[2])
-        radius = maps.radii[row[4] + m]
-        clearance = min(clearance, mover_gap(x, y, abs(radius), state, body))
-        if radius > 0.0:
-            movers[0, shown], movers[1, shown], movers[2, shown] = x, y, radius
+        if maps.radii[row[4] + m] > 0.0:
+            x, y, _, _ = mover_at(i, m, 0.0, robots, maps, body.rates[2])
+            movers[0, shown], movers[1, shown], movers[2, shown] = x, y, maps.radii[row[4] + m]
             shown += 1
     noise, out = np.zeros(count), np.empty(count)
     if robots.noise[i, 6] > 0.0 and body.ranges[3] > 0.0:
@@ -289,8 +299,6 @@ def look(i: int, body: Body, robots: Robots, maps: Maps) -> None:
     for k in range(count):
         seen[k] = min(max(out[k] / body.ranges[1], 0.0), 1.0)
     see(i, body, robots)
-    robots.facts[i, CLEARANCE] = clearance
-    robots.facts[i, DISTANCE] = math.hypot(robots.goal[i, 0] - state[X], robots.goal[i, 1] - state[Y])
     for k in range(COLUMNS - 1):
         robots.digest[i] = next_random(robots.digest[i] ^ robots.bits[i, k])
 

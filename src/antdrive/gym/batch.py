@@ -18,6 +18,7 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.worlds import Task, Trajectories
 
 ACTION_HZ, CONTROL_HZ, PHYSICS_HZ = 10, 60, 240
+SCAN_RATE = ACTION_HZ * (1 + 1e-6)  # due at each action, whatever the rounding [Hz]
 MOST_DELAY = CONTROL_HZ  # control periods in the longest delay that `Noise` allows
 #: How an episode ended, by the kernels' number; None while it goes on.
 ENDINGS = (
@@ -49,7 +50,7 @@ def thinned(robot: RobotSpec, beams: int, reach: float) -> RobotSpec:
         raise InputError(f"robot: {robot.name} has no lidar; add one to its file, or drive jackal or turtlebot4")
     try:
         most = min(reach, robot.lidar.max_range)
-        lidar = dataclasses.replace(robot.lidar, beams=beams, max_range=most, rate=float(ACTION_HZ))
+        lidar = dataclasses.replace(robot.lidar, beams=beams, max_range=most, rate=SCAN_RATE)
     except (ValueError, TypeError) as error:
         raise InputError(f"lidar: {error}") from None
     return dataclasses.replace(robot, lidar=lidar)
@@ -109,7 +110,11 @@ class KinematicPlant:
         gains = [(steady / fix) ** 2 if fix else 1.0 for steady, fix in errors]
         robots.noise[i] = (levels.pose_xy, levels.pose_yaw, levels.encoder, levels.slip, *gains, episode.noise)
         robots.timing[i] = round(levels.delay * CONTROL_HZ), max(1, round(CONTROL_HZ / levels.pose_rate))
-        kernels.place(i, self._body, robots, self._maps)
+        self._start(i, episode)
+
+    def _start(self, i: int, episode: Episode) -> None:
+        """Observe at the start of an episode."""
+        kernels.place(i, self._body, self.robots, self._maps)
 
     def drive(self, chosen: Flags, actions: Floats) -> None:
         """Drive the chosen robots for one action each (N, 2), in parts of the highest speed and yaw rate."""

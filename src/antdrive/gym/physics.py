@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,7 @@ from antdrive.base.types import Flags, Floats
 from antdrive.gym import _kernels_batch as kernels
 from antdrive.gym.batch import ACTION_HZ, CONTROL_HZ, ENDINGS, PHYSICS_HZ, Episode, KinematicPlant
 from antdrive.planners import load_planner
-from antdrive.robots import RobotSpec, Twist, footprint_clearance
-from antdrive.worlds import Disc, World
+from antdrive.robots import RobotSpec, Twist
 
 
 def open_session(scenario: sim.Scenario) -> Any:
@@ -33,40 +31,34 @@ def open_session(scenario: sim.Scenario) -> Any:
     return drive.__enter__()
 
 
-def true_pose(drive: Any) -> Any:
-    """Return the robot's true pose, for rewards and infos alone."""
-    return drive._plant.state.pose
-
-
 class PhysicsPlant(KinematicPlant):
     """Robots in physics, one after the other; `make_vec(..., vectorization_mode="async")` uses a process for each."""
 
     def __init__(self, robot: RobotSpec, number: int, steps: int) -> None:
         super().__init__(robot, number, steps)
-        self._limit, self._drives = steps / ACTION_HZ, dict[int, Any]()
-        self._scenarios, self._results = dict[int, sim.Scenario](), dict[int, dict[str, Any]]()
+        self._limit = steps / ACTION_HZ
+        self._drives, self._results = dict[int, Any](), dict[int, dict[str, Any]]()
 
-    def place(self, i: int, episode: Episode) -> None:
-        """Put robot i at the start of an episode, and observe."""
+    def _start(self, i: int, episode: Episode) -> None:
         self.leave(i)
-        self.tasks[i], robots = episode.task, self.robots
-        scenario = self._scenarios[i] = sim.Scenario(
-            task=episode.task,
-            planner=load_planner("astar"),
-            planner_name="astar",
-            robot=self._spec,
-            seed=episode.seed,
-            noise=episode.noise,
-            margin=0.0,
-            perception=sim.Perception(kind="lidar"),
-            control_hz=CONTROL_HZ,
-            physics_hz=PHYSICS_HZ,
-            time_limit=self._limit,
+        self.robots.ending[i] = 0
+        self._drives[i] = open_session(
+            sim.Scenario(
+                task=episode.task,
+                planner=load_planner("astar"),
+                planner_name="astar",
+                robot=self._spec,
+                seed=episode.seed,
+                noise=episode.noise,
+                margin=0.0,
+                perception=sim.Perception(kind="lidar"),
+                control_hz=CONTROL_HZ,
+                physics_hz=PHYSICS_HZ,
+                time_limit=self._limit,
+            )
         )
-        self._drives[i] = open_session(scenario)
-        robots.state[i], robots.ending[i], robots.tick[i] = 0.0, 0, 0
-        robots.goal[i] = (*episode.task.goal, episode.task.goal_tolerance)
-        self._look(i)
+        self._observe(i)
+        self._note(i)
 
     def drive(self, chosen: Flags, actions: Floats) -> None:
         """Drive the chosen robots for one action each (N, 2), in parts of the highest speed and yaw rate."""
@@ -78,11 +70,11 @@ class PhysicsPlant(KinematicPlant):
                 drive.step(Twist(*robots.state[i, kernels.TO_SPEED : kernels.TO_TURN + 1].tolist()))
                 if not drive.ended:
                     self._observe(i)
-                if drive.ended or kernels.arrived(i, robots):
+                    if self._arrived(i):
+                        drive.step(None)  # the referee judges where it stands
+                if drive.ended:
                     break
-            if not drive.ended and kernels.arrived(i, robots):
-                drive.step(None)  # the referee judges where it stands
-            self._look(i)
+            self._note(i)
             robots.facts[i, kernels.PROGRESS] = before - robots.facts[i, kernels.DISTANCE]
             if drive.ended:
                 self.leave(i)
@@ -93,8 +85,10 @@ class PhysicsPlant(KinematicPlant):
         if drive is None:
             return
         drive.__exit__(None, None, None)
-        log = drive.rollout
-        self.robots.ending[i] = ENDINGS.index(log.outcome) if log.outcome in ENDINGS else 0
+        log, robots = drive.rollout, self.robots
+        robots.ending[i] = ENDINGS.index(log.outcome) if log.outcome in ENDINGS else 0
+        if log.outcome.with_contact:
+            robots.facts[i, kernels.CLEARANCE] = min(robots.facts[i, kernels.CLEARANCE], 0.0)
         self._results[i] = {"digest": log.digest, "certificate": sim.certify(log), "rollout": log}
 
     def results(self, i: int) -> dict[str, Any]:
@@ -102,35 +96,23 @@ class PhysicsPlant(KinematicPlant):
         self.leave(i)
         return self._results.pop(i)
 
-    def movers(self, i: int) -> Floats:
-        """Return the present positions of the movers in the world of robot i (M, 2) [m]."""
-        return np.asarray(self._scenarios[i].trajectories.positions(self.robots.tick[i] / CONTROL_HZ)[0])
-
     def _observe(self, i: int) -> None:
-        """Note what robot i observes in this control period, and where it truly is."""
+        """Note what robot i observes in this control period."""
         now, state, robots = self._drives[i].observe(), self.robots.state[i], self.robots
-        robots.tick[i] = now.tick
+        robots.tick[i], robots.timing[i, 0] = now.tick, len(now.pending)
         state[kernels.BELIEVED : kernels.BELIEVED + 3] = now.pose
         state[kernels.SPEED], state[kernels.TURN] = now.twist
-        count = self._body.beams.shape[1]
         if now.scan is not None:
-            robots.seen[i, :count] = np.clip(now.scan / self._body.ranges[1], 0.0, 1.0)
-        robots.timing[i, 0] = len(now.pending)
+            robots.seen[i, : len(now.scan)] = np.clip(now.scan / self._body.ranges[1], 0.0, 1.0)
         for k, command in enumerate(now.pending):
             robots.pending[i, (now.tick + k) % len(now.pending)] = command
-        kernels.see(i, self._body, robots)
 
-    def _look(self, i: int) -> None:
-        """Observe with robot i, if its drive goes on, and note what is true."""
-        drive, scenario, robots = self._drives[i], self._scenarios[i], self.robots
-        if not drive.ended:
-            self._observe(i)
-        pose, world, goal = true_pose(drive), scenario.driven_world, scenario.task.goal
-        radii = scenario.trajectories.radii.tolist()
-        there = [Disc(x, y, radius) for (x, y), radius in zip(self.movers(i).tolist(), radii, strict=True)]
-        among = World(world.name, world.bounds, (*world.obstacles, *there)) if there else world
-        clearance = float(footprint_clearance(among, self._spec.footprint, [pose])[0])
-        if drive.ended and drive.ended.outcome.with_contact:
-            clearance = min(clearance, 0.0)
-        robots.state[i, :3] = pose
-        robots.facts[i, : kernels.PROGRESS] = clearance, math.dist(pose[:2], goal)
+    def _arrived(self, i: int) -> bool:
+        """Return whether robot i stands at the goal by its estimate."""
+        return kernels.arrived(i, self.robots) != kernels.DRIVING
+
+    def _note(self, i: int) -> None:
+        """Write the observation of robot i, and what is true, for rewards and infos alone."""
+        kernels.see(i, self._body, self.robots)
+        self.robots.state[i, :3] = self._drives[i]._plant.state.pose
+        kernels.note(i, self._body, self.robots, self._maps)

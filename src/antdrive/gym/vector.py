@@ -53,6 +53,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         worlds: number of generated worlds
         source: the world, or the file or folder of a set of worlds
         options: options of the worlds' generator
+        rollouts: whether the last step's info has the log of a drive in physics
         autoreset_mode: when a robot whose episode has ended begins the next one
         render_mode: `rgb_array` or None
 
@@ -78,6 +79,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         worlds: int = 1000,
         source: Source | None = None,
         options: Mapping[str, Any] = MappingProxyType({}),
+        rollouts: bool = False,
         autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
     ) -> None:
@@ -92,6 +94,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         self._course = course_of(course, self._robot, worlds, source, options)
         self._noise, self._limit, self._flat, self._beams = _factor(noise), steps, flat, beams
         self._terms = terms_of(reward)
+        self._hidden = () if rollouts else ("rollout",)
         self._plant = plant_of(plant)(self._robot, num_envs, steps)
         self._tasks: dict[int, Task] = {}
         self.rngs = list[np.random.Generator]()  # one for each robot
@@ -245,7 +248,8 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         info = _masked(values, chosen)
         if over is not None and over.any():
             for i in np.flatnonzero(over):
-                for key, value in self._plant.results(int(i)).items():
+                results = self._plant.results(int(i))
+                for key, value in ((key, value) for key, value in results.items() if key not in self._hidden):
                     info.setdefault(key, np.full(self.num_envs, None, dtype=object))[i] = value
                     info[f"_{key}"] = over.copy()
         return info
