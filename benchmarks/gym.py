@@ -3,7 +3,8 @@
 Robots with 64 beams drive among 64 discs, at ten actions a second; both simulators step in turn within one run, and the median
 over the rounds counts. Ours includes limits, exact contact, rewards, infos and new episodes; at noise 1 slip, delay and pose
 fixes, too. ir-sim's robots share one world, in which no lidar sees another robot and no collision is checked. Times are
-processor times of one core. `--memory` prints the memory of 4,096 robots. Prints Markdown.
+processor times of one core. `--memory` prints the memory of 4,096 robots. `--alike N` drives N episodes without noise on both
+plants and compares where the robots are and how they end. Prints Markdown.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import statistics
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -116,6 +118,40 @@ def print_memory(robots: int = 4096) -> None:
     print(f"{robots} robots: {grown:.0f} MB")
 
 
+def steered(observation: Any) -> Any:
+    """An action towards the goal, slower and to the freer side near obstacles."""
+    scan, (_, cos, sin) = observation["scan"], observation["goal"]
+    ahead, middle = 10.0 * scan[BEAMS * 3 // 8 : BEAMS * 5 // 8].min(), BEAMS // 2
+    aside = np.sign(scan[middle:].mean() - scan[:middle].mean()) if ahead < 1.5 else 0.0
+    return np.array([np.clip(ahead / 4 - 0.1, 0.02, 0.5), np.clip(np.arctan2(sin, cos) + aside, -1, 1)])
+
+
+def print_alike(count: int) -> None:
+    """How far the kinematic plant is from physics when both take the same actions, until one of them ends."""
+    apart, same, outcomes = list[float](), 0, Counter[str]()
+    plants = [NavigationEnv("forest", plant=plant, beams=BEAMS) for plant in ("bullet", "kinematic")]
+    for seed in range(count):
+        (observation, _), _ = (plant.reset(seed=seed) for plant in plants)
+        ends, worst = ["", ""], 0.0
+        while not any(ends):
+            action = steered(observation)
+            steps = [plant.step(action) for plant in plants]
+            observation, poses = steps[0][0], [plant.pose for plant in plants]
+            worst = max(worst, float(np.hypot(*(poses[0] - poses[1])[:2])))
+            ends = [step[4]["outcome"] for step in steps]
+        while not all(ends):  # one plant ended a step or two before the other
+            late = ends.index("")
+            ends[late] = plants[late].step(steered(observation))[4]["outcome"] or ends[late]
+        apart.append(worst)
+        same += ends[0] == ends[1]
+        outcomes[ends[0]] += 1
+    shares = [f"{1e3 * np.quantile(apart, share):.1f}" for share in (0.5, 0.95, 1.0)]
+    print_table(
+        "episodes | same outcome | largest distance: median | 95 % | most [mm] | outcomes in physics",
+        [(str(count), f"{100 * same / count:.1f} %", *shares, str(dict(outcomes)))],
+    )
+
+
 def main() -> None:
     o = command_line(
         __doc__,
@@ -123,7 +159,11 @@ def main() -> None:
         steps=(100, "actions in a round"),
         rounds=(5, "rounds"),
         memory=(False, "print the memory of 4,096 robots"),
+        alike=(0, "episodes on both plants"),
     )
+    if o.alike:
+        print_alike(o.alike)
+        return
     if o.memory:
         print_memory()
         return

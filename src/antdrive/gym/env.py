@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from antdrive.base.errors import InputError
+from antdrive.base.types import Floats
 from antdrive.gym.vector import METADATA, NavigationVectorEnv
 
 
@@ -57,6 +58,11 @@ class NavigationEnv(gymnasium.Env[Any, Any]):
         """Return a picture of the robot's world (H, W, 3); None without a render mode."""
         pictures = self._batch.render()
         return None if pictures is None else pictures[0]
+
+    @property
+    def pose(self) -> Floats:
+        """The robot's true pose (3,): x, y [m] and yaw [rad]; no part of what it observes."""
+        return self._batch.poses[0]
 
     def close(self) -> None:
         """End the drive in physics."""

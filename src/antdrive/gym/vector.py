@@ -189,6 +189,11 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
             return None
         return tuple(self._picture(i) for i in range(self.num_envs))
 
+    @property
+    def poses(self) -> Floats:
+        """The robots' true poses (N, 3): x, y [m] and yaw [rad]; no part of what they observe."""
+        return np.array(self._plant.robots.state[:, :3])
+
     def close_extras(self, **kwargs: Any) -> None:
         """End the drives in physics."""
         for i in range(self.num_envs):
