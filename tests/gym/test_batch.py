@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from antdrive.gym import _kernels_batch as kernels
-from antdrive.gym.batch import CONTROL_HZ, PHYSICS_HZ, Episode, KinematicPlant, thinned
+from antdrive.gym.batch import CONTROL_HZ, ENDINGS, PHYSICS_HZ, Episode, KinematicPlant, thinned
 from antdrive.robots import Footprint, footprint_clearance, load_robot
 from antdrive.robots.noise import SLIP_TIME
 from antdrive.sim.log.outcome import Outcome
@@ -136,7 +136,7 @@ def test_the_first_contact_ends_the_episode_within_a_physics_step(name):
     world = World("wall", (0.0, 0.0, 8.0, 4.0), (Disc(4.0, 2.1, 0.2),))
     plant = plant_at(Task(world, (1.0, 2.0, 0.0), (7.0, 2.0)), robot)
     *_, state = driven(plant, [(1.0, 0.0)] * 50)
-    assert plant.outcome(0) is Outcome.COLLIDED
+    assert ENDINGS[plant.robots.ending[0]] is Outcome.COLLIDED
     gap = footprint_clearance(world, robot.footprint, [state[:3]])[0]
     assert -state[kernels.SPEED] / PHYSICS_HZ <= gap <= 1e-4
 
@@ -145,7 +145,7 @@ def hit_by(mover, action=(0.0, 0.0), bounds=(0.0, 0.0, 9.0, 4.0)):
     task = Task(World("hit", bounds, movers=(mover,)), (3.0, 2.0, 0.0), (8.0, 2.0))
     plant = plant_at(task)
     list(driven(plant, [action] * 100))
-    return plant.outcome(0)
+    return ENDINGS[plant.robots.ending[0]]
 
 
 COMING = Cruising(radius=0.3, position=(6.0, 2.0), velocity=(-1.0, 0.0))
@@ -167,7 +167,7 @@ def test_a_robot_that_drives_to_the_goal_brakes_and_stands_there():
     task = Task(World("open", (0.0, 0.0, 9.0, 4.0)), (1.0, 2.0, 0.0), (3.0, 2.0))
     plant = plant_at(task)
     *_, state = driven(plant, [(0.4, 0.0)] * 60)
-    assert plant.outcome(0) is Outcome.SUCCEEDED
+    assert ENDINGS[plant.robots.ending[0]] is Outcome.SUCCEEDED
     assert math.dist(state[:2], task.goal) <= task.goal_tolerance
     assert abs(state[kernels.SPEED]) < 0.01
 

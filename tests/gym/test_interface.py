@@ -191,7 +191,7 @@ def test_a_function_replaces_the_reward():
         ({"course": "barn50"}, "source: missing; name the folder or archive of the BARN challenge's"),
         ({"robot": NO_LIDAR}, "robot: jackal has no lidar; add one to its file, or drive jackal or turtlebot4"),
         ({"plant": "real"}, "plant: unknown 'real'; choose kinematic or bullet"),
-        ({"noise": -1}, "noise: must be from 0 to 10, got -1"),
+        ({"noise": -1}, "noise: -1 times the robot's own is too much"),
         ({"beams": 1}, "lidar: beams: must be between 3 and 10000, got 1"),
         ({"steps": 0}, "steps: must be at least 1, got 0"),
         ({"worlds": 0}, "worlds: must be at least 1, got 0"),
@@ -215,7 +215,8 @@ def test_an_invalid_argument_is_named(arguments, message):
         ({"goal": (1.0,)}, "goal: must be x and y"),
         ({"goal": "here"}, "start, goal: must be numbers"),
         ({"start": (0.1, 2.0, 0.0)}, "start: jackal overlaps the left wall"),
-        ({"noise": 11}, "noise: must be from 0 to 10, got 11"),
+        ({"noise": 1e3}, "noise: 1000 times the robot's own is too much"),
+        ({"noise": "much"}, "noise: must be a number, got 'much'"),
         ({"reset_mask": [1]}, "options: reset_mask must be 1 booleans"),
     ],
 )
@@ -225,11 +226,11 @@ def test_an_invalid_option_is_named(options, message):
     assert str(error.value).startswith(message)
 
 
-@pytest.mark.parametrize("action", [np.array([np.nan, 0.0]), np.zeros(3), np.array([0.0, np.inf])])
+@pytest.mark.parametrize("action", [np.array([np.nan, 0.0]), np.zeros(3), np.array([0.0, np.inf]), [1], "ahead", None])
 def test_an_invalid_action_is_refused(action):
     env = NavigationEnv("world", source=OPEN)
     env.reset(seed=0)
-    with pytest.raises(InputError, match=r"^actions?: must"):
+    with pytest.raises(InputError, match=r"^actions: must be finite numbers of shape \(1, 2\)"):
         env.step(action)
 
 

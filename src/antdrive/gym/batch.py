@@ -123,10 +123,6 @@ class KinematicPlant:
     def leave(self, i: int) -> None:
         """End the episode of robot i; nothing is open."""
 
-    def outcome(self, i: int) -> Outcome | None:
-        """Return how an episode ended; None while it goes on."""
-        return ENDINGS[self.robots.ending[i]]
-
     def results(self, i: int) -> dict[str, Any]:
         """Return what is known of an episode at its end: the digest of all its states."""
         return {"digest": f"{int(self.robots.digest[i]):016x}"}

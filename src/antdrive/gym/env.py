@@ -9,7 +9,6 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from antdrive.base.errors import InputError
 from antdrive.base.types import Floats
 from antdrive.gym.vector import METADATA, NavigationVectorEnv
 
@@ -48,10 +47,7 @@ class NavigationEnv(gymnasium.Env[Any, Any]):
         Raises:
             InputError: the action has another shape, or is not finite.
         """
-        wanted = np.asarray(action)
-        if wanted.shape != (2,):
-            raise InputError(f"action: must have shape (2,), got {wanted.shape}")
-        observation, rewards, terminated, truncated, info = self._batch.step(wanted[None])
+        observation, rewards, terminated, truncated, info = self._batch.step([action])
         return _single(observation), float(rewards[0]), bool(terminated[0]), bool(truncated[0]), _single(info)
 
     def render(self) -> Any:
@@ -62,7 +58,7 @@ class NavigationEnv(gymnasium.Env[Any, Any]):
     @property
     def pose(self) -> Floats:
         """The robot's true pose (3,): x, y [m] and yaw [rad]; no part of what it observes."""
-        return self._batch.poses[0]
+        return np.asarray(self._batch.poses[0])
 
     def close(self) -> None:
         """End the drive in physics."""

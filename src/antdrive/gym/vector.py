@@ -13,13 +13,14 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from antdrive.base.errors import InputError
+from antdrive.base.errors import FieldError, InputError, require
 from antdrive.base.types import Flags, Floats
 from antdrive.gym.batch import ACTION_HZ, ENDINGS, Episode, KinematicPlant, thinned
 from antdrive.gym.courses import Source, course_of, repeated, task_of
 from antdrive.gym.rewards import NEAR, Facts, Rule, terms_of
 from antdrive.robots import RobotSpec, load_robot
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import require_factors
 from antdrive.worlds import Task
 
 KEYS = np.array(["" if ending is None else ending.key for ending in ENDINGS] + [Outcome.TIMED_OUT.key])
@@ -92,7 +93,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         self.num_envs, self.render_mode = num_envs, render_mode
         self._robot = thinned(robot if isinstance(robot, RobotSpec) else load_robot(robot), beams, reach)
         self._course = course_of(course, self._robot, worlds, source, options)
-        self._noise, self._limit, self._flat, self._beams = _factor(noise), steps, flat, beams
+        self._noise, self._limit, self._flat, self._beams = self._factor(noise), steps, flat, beams
         self._terms = terms_of(reward)
         self._hidden = () if rollouts else ("rollout",)
         self._plant = plant_of(plant)(self._robot, num_envs, steps)
@@ -153,9 +154,12 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
             InputError: the actions have another shape, or are not finite.
             ResetNeeded: a robot's episode has ended, and it is not reset by itself.
         """
-        wanted = np.array(actions, dtype=np.float64)
+        try:
+            wanted = np.array(actions, dtype=np.float64)
+        except (TypeError, ValueError):
+            wanted = np.empty(0)
         if wanted.shape != (self.num_envs, 2) or not np.isfinite(wanted).all():
-            raise InputError(f"actions: must be finite numbers of shape ({self.num_envs}, 2), got {wanted!r:.100}")
+            raise InputError(f"actions: must be finite numbers of shape ({self.num_envs}, 2), got {actions!r:.100}")
         mode, fresh = self.metadata["autoreset_mode"], self._over
         if not self.rngs or (mode is AutoresetMode.DISABLED and fresh.any()):
             raise ResetNeeded("call reset first: an episode has ended")
@@ -217,9 +221,19 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         if world is not None or any(end is not None for end in ends.values()):
             task = task_of(task, self._robot, **ends)
         key = number if world is None else task.world, task.start if task.world.movers else None
-        noise = self._noise if options.get("noise") is None else _factor(options["noise"])
+        noise = self._noise if options.get("noise") is None else self._factor(options["noise"])
         self._plant.place(i, Episode(task, key, seed, noise))
         self._steps[i], self._over[i] = 0, False
+
+    def _factor(self, noise: Any) -> float:
+        try:
+            require_factors(self._robot, noise, 0.0)
+            require("noise", noise, at_least=0.0)
+        except FieldError as error:
+            raise error.as_input() from None
+        except TypeError:
+            raise InputError(f"noise: must be a number, got {noise!r:.60}") from None
+        return float(noise)
 
     def _observation(self) -> Any:
         """Return what the robots observe, in new arrays."""
@@ -253,10 +267,10 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         info = _masked(values, chosen)
         if over is not None and over.any():
             for i in np.flatnonzero(over):
-                results = self._plant.results(int(i))
-                for key, value in ((key, value) for key, value in results.items() if key not in self._hidden):
-                    info.setdefault(key, np.full(self.num_envs, None, dtype=object))[i] = value
-                    info[f"_{key}"] = over.copy()
+                for key, value in self._plant.results(int(i)).items():
+                    if key not in self._hidden:
+                        info.setdefault(key, np.full(self.num_envs, None, dtype=object))[i] = value
+                        info[f"_{key}"] = over.copy()
         return info
 
 
@@ -280,12 +294,6 @@ def compositor_of(task: Task, robot: RobotSpec) -> Any:
     scene = Scene.running(task, robot)
     camera = camera_for("oblique", scene.bounds[:2], scene.bounds[2:], drawn_height(scene), PICTURE)
     return Compositor(scene, camera, route=np.empty((0, 2)))
-
-
-def _factor(noise: Any) -> float:
-    if not isinstance(noise, int | float) or not 0 <= noise <= 10:
-        raise InputError(f"noise: must be from 0 to 10, got {noise!r}")
-    return float(noise)
 
 
 def _masked(values: Mapping[str, Any], mask: Flags) -> dict[str, Any]:
