@@ -116,17 +116,19 @@ def test_slip_delay_odometry_and_fixes_follow_their_equations():
         assert plant.robots.seen[0, 64] == pytest.approx(min(away / kernels.FARTHEST, 1.0), abs=1e-9)
 
 
-def test_commands_keep_every_limit_of_the_robot():
-    limits, period, command = KinematicPlant(ROBOT, 1, 1)._body.limits, 1 / CONTROL_HZ, (0.0, 0.0)
+@pytest.mark.parametrize("binding", [{}, {"max_wheel_speed": 21.0, "max_lateral_acceleration": 50.0}])
+def test_commands_keep_every_limit_of_the_robot(binding):
+    robot = dataclasses.replace(ROBOT, **binding)
+    limits, period, command = KinematicPlant(robot, 1, 1)._body.limits, 1 / CONTROL_HZ, (0.0, 0.0)
     rng = np.random.default_rng(1)
     for action in np.repeat(rng.choice((-1.0, 1.0, 0.3), (200, 2)), 20, axis=0):
         speed, turn = kernels.limited(*command, *action, period, limits)
-        assert abs(speed) <= ROBOT.max_speed
-        assert abs(speed - command[0]) <= ROBOT.max_acceleration * period + 1e-12
-        assert abs(turn) <= ROBOT.max_yaw_rate
-        assert abs(turn) - abs(command[1]) <= ROBOT.max_yaw_acceleration * period + 1e-12
-        assert abs(speed * turn) <= ROBOT.max_lateral_acceleration + 1e-9
-        assert abs(speed) + abs(turn) * ROBOT.track / 2 <= ROBOT.max_wheel_speed * ROBOT.wheel_radius + 1e-9
+        assert abs(speed) <= robot.max_speed
+        assert abs(speed - command[0]) <= robot.max_acceleration * period + 1e-12
+        assert abs(turn) <= robot.max_yaw_rate
+        assert abs(turn) - abs(command[1]) <= robot.max_yaw_acceleration * period + 1e-12
+        assert abs(speed * turn) <= robot.max_lateral_acceleration + 1e-9
+        assert abs(speed) + abs(turn) * robot.track / 2 <= robot.max_wheel_speed * robot.wheel_radius + 1e-9
         command = speed, turn
 
 
