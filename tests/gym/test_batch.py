@@ -90,7 +90,7 @@ def test_slip_delay_odometry_and_fixes_follow_their_equations():
     gain_xy, gain_yaw = plant.robots.noise[0, 4:6]
     normals(2)
     estimate = pose + (gain_xy, gain_xy, gain_yaw) * fixed(pose)
-    tick, limits = 0, plant._body.limits
+    tick, limits = 0, plant._shared.limits
     for action, state in zip(wandering(40), driven(plant, wandering(40)), strict=True):
         for _ in range(CONTROL_HZ // 10):
             command = kernels.limited(*command, *action, period, limits)
@@ -119,7 +119,7 @@ def test_slip_delay_odometry_and_fixes_follow_their_equations():
 @pytest.mark.parametrize("binding", [{}, {"max_wheel_speed": 21.0, "max_lateral_acceleration": 50.0}])
 def test_commands_keep_every_limit_of_the_robot(binding):
     robot = dataclasses.replace(ROBOT, **binding)
-    limits, period, command = KinematicPlant(robot, 1, 1)._body.limits, 1 / CONTROL_HZ, (0.0, 0.0)
+    limits, period, command = KinematicPlant(robot, 1, 1)._shared.limits, 1 / CONTROL_HZ, (0.0, 0.0)
     rng = np.random.default_rng(1)
     for action in np.repeat(rng.choice((-1.0, 1.0, 0.3), (200, 2)), 20, axis=0):
         speed, turn = kernels.limited(*command, *action, period, limits)

@@ -41,7 +41,7 @@ class Maps(NamedTuple):
     tracks: Array  # positions of each world's movers in each control period (T, M, 2), flat
 
 
-class Body(NamedTuple):
+class SharedSpec(NamedTuple):
     """The robots' common specification."""
 
     limits: Array  # speed, yaw rate, acceleration, yaw acceleration, lateral acceleration, rim speed, half the track
@@ -72,29 +72,29 @@ class Robots(NamedTuple):
 
 
 @kernel
-def place(i: int, body: Body, robots: Robots, maps: Maps) -> None:
+def place(i: int, shared: SharedSpec, robots: Robots, maps: Maps) -> None:
     """Observe with robot i, which stands at its start."""
-    measure(i, body, robots)
-    look(i, body, robots, maps)
+    measure(i, shared, robots)
+    look(i, shared, robots, maps)
 
 
 @kernel
-def drive(chosen: Array, actions: Array, body: Body, robots: Robots, maps: Maps) -> None:
+def drive(chosen: Array, actions: Array, shared: SharedSpec, robots: Robots, maps: Maps) -> None:
     """Drive the chosen robots for one action each, in parts of their highest speed and yaw rate (N, 2)."""
     for i in range(len(chosen)):
         if not chosen[i]:
             continue
         before = robots.facts[i, DISTANCE]
-        for _ in range(body.rates[0]):
-            decide(i, actions[i, 0], actions[i, 1], body, robots)
-            robots.ending[i] = move(i, body, robots, maps)
+        for _ in range(shared.rates[0]):
+            decide(i, actions[i, 0], actions[i, 1], shared, robots)
+            robots.ending[i] = move(i, shared, robots, maps)
             if robots.ending[i] == DRIVING:
                 robots.tick[i] += 1
-                measure(i, body, robots)
+                measure(i, shared, robots)
                 robots.ending[i] = arrived(i, robots)
             if robots.ending[i] != DRIVING:
                 break
-        look(i, body, robots, maps)
+        look(i, shared, robots, maps)
         robots.facts[i, PROGRESS] = before - robots.facts[i, DISTANCE]
         if robots.ending[i] >= COLLIDED:
             robots.facts[i, CLEARANCE] = min(robots.facts[i, CLEARANCE], 0.0)
@@ -117,9 +117,9 @@ def at_goal(x: float, y: float, goal: Array) -> bool:
 
 
 @leaf
-def decide(i: int, speed: float, turn: float, body: Body, robots: Robots) -> None:
+def decide(i: int, speed: float, turn: float, shared: SharedSpec, robots: Robots) -> None:
     """Command a robot to an action within its limits; at the goal it brakes."""
-    state, limits, period = robots.state[i], body.limits, 1.0 / body.rates[2]
+    state, limits, period = robots.state[i], shared.limits, 1.0 / shared.rates[2]
     if at_goal(state[BELIEVED], state[BELIEVED + 1], robots.goal[i]):
         speed, turn = 0.0, 0.0
     state[TO_SPEED], state[TO_TURN] = limited(state[TO_SPEED], state[TO_TURN], speed, turn, period, limits)
@@ -144,10 +144,10 @@ def limited(
 
 
 @kernel
-def move(i: int, body: Body, robots: Robots, maps: Maps) -> int:
+def move(i: int, shared: SharedSpec, robots: Robots, maps: Maps) -> int:
     """Move a robot for one control period, and return its ending: the first contact."""
-    state, limits, noise = robots.state[i], body.limits, robots.noise[i]
-    period, half_track = 1.0 / body.rates[2], limits[6]
+    state, limits, noise = robots.state[i], shared.limits, robots.noise[i]
+    period, half_track = 1.0 / shared.rates[2], limits[6]
     speed, turn = state[TO_SPEED], state[TO_TURN]
     if robots.timing[i, 0] > 0:
         slot = robots.tick[i] % robots.timing[i, 0]
@@ -162,7 +162,7 @@ def move(i: int, body: Body, robots: Robots, maps: Maps) -> int:
         left = (speed - turn * half_track) * (1.0 + state[SLIP])
         right = (speed + turn * half_track) * (1.0 + state[SLIP + 1])
         speed, turn = (left + right) / 2.0, (right - left) / (2.0 * half_track)
-    radius, parts = outer_radius(body.shape[0], body.shape[1], body.shape[2], body.corners), body.rates[1]
+    radius, parts = outer_radius(shared.shape[0], shared.shape[1], shared.shape[2], shared.corners), shared.rates[1]
     step = period / parts
     before, fastest = abs(state[SPEED]) + radius * abs(state[TURN]), abs(speed) + radius * abs(turn)
     state[SPEED], state[TURN] = speed, turn
@@ -173,34 +173,34 @@ def move(i: int, body: Body, robots: Robots, maps: Maps) -> int:
         state[YAW] += turn * step
         state[FREE] -= fastest * step
         if state[FREE] <= TOUCHING:
-            state[FREE] = static_gap(i, body, robots, maps)
+            state[FREE] = static_gap(i, shared, robots, maps)
             if state[FREE] <= TOUCHING:
                 return COLLIDED
-        ending = hit(i, (k + 1.0) / parts, before if k == 0 else fastest, body, robots, maps)
+        ending = hit(i, (k + 1.0) / parts, before if k == 0 else fastest, shared, robots, maps)
         if ending != DRIVING:
             return ending
     return DRIVING
 
 
 @kernel
-def static_gap(i: int, body: Body, robots: Robots, maps: Maps) -> float:
+def static_gap(i: int, shared: SharedSpec, robots: Robots, maps: Maps) -> float:
     """Return the exact distance from a robot's footprint to the nearest cylinder or wall."""
     state, world = robots.state[i], robots.world[i]
     row = maps.rows[world]
     discs = maps.discs[row[0] : row[0] + 3 * row[1]].reshape((row[1], 3))
-    shape = body.shape
+    shape = shared.shape
     return footprint_gap(
-        state[X], state[Y], state[YAW], shape[0], shape[1], shape[2], body.corners, discs, maps.bounds[world]
+        state[X], state[Y], state[YAW], shape[0], shape[1], shape[2], shared.corners, discs, maps.bounds[world]
     )
 
 
 @leaf
-def hit(i: int, share: float, fastest: float, body: Body, robots: Robots, maps: Maps) -> int:
+def hit(i: int, share: float, fastest: float, shared: SharedSpec, robots: Robots, maps: Maps) -> int:
     """Return the ending of a robot that touches a mover at a part of the control period, by the rule of log/contacts.py."""
     row, state = maps.rows[robots.world[i]], robots.state[i]
     for m in range(row[5]):
-        x, y, pace, jumped = mover_at(i, m, share, robots, maps, body.rates[2])
-        if mover_gap(x, y, abs(maps.radii[row[4] + m]), state, body) <= TOUCHING:
+        x, y, pace, jumped = mover_at(i, m, share, robots, maps, shared.rates[2])
+        if mover_gap(x, y, abs(maps.radii[row[4] + m]), state, shared) <= TOUCHING:
             if jumped:
                 return HIT_BY_TELEPORT
             return HIT_WHILE_STANDING if fastest <= min(STANDING_SPEED, pace) else COLLIDED
@@ -222,17 +222,17 @@ def mover_at(i: int, m: int, share: float, robots: Robots, maps: Maps, hz: int) 
 
 
 @leaf
-def mover_gap(x: float, y: float, radius: float, state: Array, body: Body) -> float:
+def mover_gap(x: float, y: float, radius: float, state: Array, shared: SharedSpec) -> float:
     """Return the distance from a robot's footprint to a mover."""
     dx, dy = x - state[X], y - state[Y]
     cos, sin = math.cos(state[YAW]), math.sin(state[YAW])
-    return disc_gap(dx, dy, radius, cos, sin, body.shape[0], body.shape[1], body.shape[2], body.corners)
+    return disc_gap(dx, dy, radius, cos, sin, shared.shape[0], shared.shape[1], shared.shape[2], shared.corners)
 
 
 @leaf
-def measure(i: int, body: Body, robots: Robots) -> None:
+def measure(i: int, shared: SharedSpec, robots: Robots) -> None:
     """Estimate a robot's pose by odometry and fixes, as `antdrive.robots.noise` does; without noise it is exact."""
-    state, noise, period, half_track = robots.state[i], robots.noise[i], 1.0 / body.rates[2], body.limits[6]
+    state, noise, period, half_track = robots.state[i], robots.noise[i], 1.0 / shared.rates[2], shared.limits[6]
     if not (noise[0] > 0.0 or noise[1] > 0.0 or noise[2] > 0.0 or noise[3] > 0.0):
         for k in range(3):
             state[BELIEVED + k] = state[X + k]
@@ -261,57 +261,57 @@ def moved(x: float, y: float, yaw: float, speed: float, turn: float, time: float
 
 
 @leaf
-def note(i: int, body: Body, robots: Robots, maps: Maps) -> None:
+def note(i: int, shared: SharedSpec, robots: Robots, maps: Maps) -> None:
     """Write a robot's true distances from all surfaces and from its goal."""
     state, row = robots.state[i], maps.rows[robots.world[i]]
-    state[FREE] = clearance = static_gap(i, body, robots, maps)
+    state[FREE] = clearance = static_gap(i, shared, robots, maps)
     for m in range(row[5]):
-        x, y, _, _ = mover_at(i, m, 0.0, robots, maps, body.rates[2])
-        clearance = min(clearance, mover_gap(x, y, abs(maps.radii[row[4] + m]), state, body))
+        x, y, _, _ = mover_at(i, m, 0.0, robots, maps, shared.rates[2])
+        clearance = min(clearance, mover_gap(x, y, abs(maps.radii[row[4] + m]), state, shared))
     robots.facts[i, CLEARANCE] = clearance
     robots.facts[i, DISTANCE] = math.hypot(robots.goal[i, 0] - state[X], robots.goal[i, 1] - state[Y])
 
 
 @kernel
-def look(i: int, body: Body, robots: Robots, maps: Maps) -> None:
+def look(i: int, shared: SharedSpec, robots: Robots, maps: Maps) -> None:
     """Write what a robot observes, and what is true."""
-    note(i, body, robots, maps)
+    note(i, shared, robots, maps)
     state, world, seen = robots.state[i], robots.world[i], robots.seen[i]
-    row, count = maps.rows[world], body.beams.shape[1]
+    row, count = maps.rows[world], shared.beams.shape[1]
     movers = np.empty((3, row[5]))
     shown = 0
     for m in range(row[5]):
         if maps.radii[row[4] + m] > 0.0:
-            x, y, _, _ = mover_at(i, m, 0.0, robots, maps, body.rates[2])
+            x, y, _, _ = mover_at(i, m, 0.0, robots, maps, shared.rates[2])
             movers[0, shown], movers[1, shown], movers[2, shown] = x, y, maps.radii[row[4] + m]
             shown += 1
     noise, out = np.zeros(count), np.empty(count)
-    if robots.noise[i, 6] > 0.0 and body.ranges[3] > 0.0:
+    if robots.noise[i, 6] > 0.0 and shared.ranges[3] > 0.0:
         for k in range(count):
             noise[k] = robots.noise[i, 6] * normal(i, robots.random)
-    cos, sin, lidar = math.cos(state[YAW]), math.sin(state[YAW]), body.lidar
+    cos, sin, lidar = math.cos(state[YAW]), math.sin(state[YAW]), shared.lidar
     eye_x, eye_y = state[X] + cos * lidar[0] - sin * lidar[1], state[Y] + sin * lidar[0] + cos * lidar[1]
     visible = maps.visible[row[2] : row[2] + 3 * row[3]].reshape((3, row[3]))
     scan(
-        eye_x, eye_y, state[YAW] + lidar[2], body.beams, lidar[4], lidar[3], body.ranges, visible,
+        eye_x, eye_y, state[YAW] + lidar[2], shared.beams, lidar[4], lidar[3], shared.ranges, visible,
         np.ascontiguousarray(movers[:, :shown]), maps.bounds[world], noise, out,
     )  # fmt: skip
     for k in range(count):
-        seen[k] = min(max(out[k] / body.ranges[1], 0.0), 1.0)
-    see(i, body, robots)
+        seen[k] = min(max(out[k] / shared.ranges[1], 0.0), 1.0)
+    see(i, shared, robots)
     for k in range(COLUMNS - 1):
         robots.digest[i] = next_random(robots.digest[i] ^ robots.bits[i, k])
 
 
 @leaf
-def see(i: int, body: Body, robots: Robots) -> None:
+def see(i: int, shared: SharedSpec, robots: Robots) -> None:
     """Write a robot's observation beside the scan: the goal from where its next command takes effect, and its twist."""
-    state, seen, count, limits = robots.state[i], robots.seen[i], body.beams.shape[1], body.limits
+    state, seen, count, limits = robots.state[i], robots.seen[i], shared.beams.shape[1], shared.limits
     x, y, yaw = state[BELIEVED], state[BELIEVED + 1], state[BELIEVED + 2]
     delay = robots.timing[i, 0]
     for k in range(delay):
         slot = (robots.tick[i] + k) % delay
-        x, y, yaw = moved(x, y, yaw, robots.pending[i, slot, 0], robots.pending[i, slot, 1], 1.0 / body.rates[2])
+        x, y, yaw = moved(x, y, yaw, robots.pending[i, slot, 0], robots.pending[i, slot, 1], 1.0 / shared.rates[2])
     away_x, away_y = robots.goal[i, 0] - x, robots.goal[i, 1] - y
     bearing = math.atan2(away_y, away_x) - yaw
     seen[count] = min(math.hypot(away_x, away_y) / FARTHEST, 1.0)

@@ -71,7 +71,7 @@ class KinematicPlant:
 
     def __init__(self, robot: RobotSpec, number: int, steps: int) -> None:
         assert robot.lidar is not None
-        self._spec, self._eye, self._body = robot, robot.lidar.height, _body(robot, robot.lidar)
+        self._spec, self._eye, self._shared = robot, robot.lidar.height, _shared_spec(robot, robot.lidar)
         self._periods = steps * CONTROL_HZ // ACTION_HZ + 2  # rows of a mover's track
         state = np.zeros((number, kernels.COLUMNS))
         self.robots = kernels.Robots(
@@ -114,11 +114,11 @@ class KinematicPlant:
 
     def _start(self, i: int, episode: Episode) -> None:
         """Observe at the start of an episode."""
-        kernels.place(i, self._body, self.robots, self._maps)
+        kernels.place(i, self._shared, self.robots, self._maps)
 
     def drive(self, chosen: Flags, actions: Floats) -> None:
         """Drive the chosen robots for one action each (N, 2), in parts of the highest speed and yaw rate."""
-        kernels.drive(chosen, actions, self._body, self.robots, self._maps)
+        kernels.drive(chosen, actions, self._shared, self.robots, self._maps)
 
     def leave(self, i: int) -> None:
         """End the episode of robot i; nothing is open."""
@@ -152,11 +152,11 @@ class KinematicPlant:
         )
 
 
-def _body(robot: RobotSpec, lidar: Lidar) -> Any:
+def _shared_spec(robot: RobotSpec, lidar: Lidar) -> Any:
     angles = lidar.angles - lidar.yaw
     limits = (robot.max_speed, robot.max_yaw_rate, robot.max_acceleration, robot.max_yaw_acceleration)
     rim = robot.max_wheel_speed * robot.wheel_radius
-    return kernels.Body(
+    return kernels.SharedSpec(
         np.array((*limits, robot.max_lateral_acceleration, rim, robot.track / 2)),
         *kernel_shape(robot.footprint),
         np.array((lidar.x, lidar.y, lidar.yaw, float(angles[0]), lidar.spacing)),

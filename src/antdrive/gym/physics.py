@@ -66,7 +66,7 @@ class PhysicsPlant(KinematicPlant):
         for i in np.flatnonzero(chosen).tolist():
             drive, before = self._drives[i], robots.facts[i, kernels.DISTANCE]
             for _ in range(CONTROL_HZ // ACTION_HZ):
-                kernels.decide(i, float(actions[i, 0]), float(actions[i, 1]), self._body, robots)
+                kernels.decide(i, float(actions[i, 0]), float(actions[i, 1]), self._shared, robots)
                 drive.step(Twist(*robots.state[i, kernels.TO_SPEED : kernels.TO_TURN + 1].tolist()))
                 if not drive.ended:
                     self._observe(i)
@@ -103,7 +103,7 @@ class PhysicsPlant(KinematicPlant):
         state[kernels.BELIEVED : kernels.BELIEVED + 3] = now.pose
         state[kernels.SPEED], state[kernels.TURN] = now.twist
         if now.scan is not None:
-            robots.seen[i, : len(now.scan)] = np.clip(now.scan / self._body.ranges[1], 0.0, 1.0)
+            robots.seen[i, : len(now.scan)] = np.clip(now.scan / self._shared.ranges[1], 0.0, 1.0)
         for k, command in enumerate(now.pending):
             robots.pending[i, (now.tick + k) % len(now.pending)] = command
 
@@ -113,6 +113,6 @@ class PhysicsPlant(KinematicPlant):
 
     def _note(self, i: int) -> None:
         """Write the observation of robot i, and what is true, for rewards and infos alone."""
-        kernels.see(i, self._body, self.robots)
+        kernels.see(i, self._shared, self.robots)
         self.robots.state[i, :3] = self._drives[i]._plant.state.pose
-        kernels.note(i, self._body, self.robots, self._maps)
+        kernels.note(i, self._shared, self.robots, self._maps)
