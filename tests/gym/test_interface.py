@@ -166,6 +166,17 @@ def test_reset_takes_a_world_a_start_a_goal_and_noise():
     assert info["distance_to_goal_m"] == 3.0
 
 
+def test_generated_worlds_have_the_options_that_are_given():
+    env = NavigationEnv("forest", options={"count": 3, "radius": (0.2, 0.3)}, worlds=2)
+    for seed in range(4):
+        env.reset(seed=seed)
+    radii = [[disc.radius for disc in task.world.obstacles] for task in env._batch._tasks.values()]
+    assert [len(one) for one in radii] == [3, 3]
+    assert all(0.2 <= radius <= 0.3 for one in radii for radius in one)
+    with pytest.raises(InputError, match="forest: cuont: unknown option"):
+        NavigationEnv("forest", options={"cuont": 3}).reset()
+
+
 def test_a_picture_shows_where_the_robot_is():
     env = NavigationEnv("world", source=OPEN, render_mode="rgb_array")
     env.reset(seed=0)

@@ -53,8 +53,9 @@ def course_of(
         if worlds < 1:
             raise InputError(f"worlds: must be at least 1, got {worlds}")
         room = {} if kind == "office" else {"robot_radius": round(robot.radius + 0.03, 3)}
-        given = tuple((key, str(value)) for key, value in {**room, **options}.items())
-        return Course(worlds, lambda number: generated(kind, number, given))
+        given = {**room, **options}.items()
+        texts = tuple((key, ",".join(map(str, v)) if isinstance(v, tuple | list) else str(v)) for key, v in given)
+        return Course(worlds, lambda number: generated(kind, number, texts))
     if kind == "world":
         task = task_of("forest" if source is None else source)
         return Course(1, lambda number: task)
