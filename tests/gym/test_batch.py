@@ -6,6 +6,8 @@ import math
 import numpy as np
 import pytest
 
+pytest.importorskip("gymnasium", reason="needs the extra `gym`")
+
 from antdrive.gym import _kernels_batch as kernels
 from antdrive.gym.batch import CONTROL_HZ, ENDINGS, PHYSICS_HZ, Episode, KinematicPlant, thinned
 from antdrive.robots import Footprint, footprint_clearance, load_robot
