@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from antdrive import sim
 from antdrive.worlds import Disc, Task, World
 from benchmarks.markdown import command_line, missing, print_table
 
@@ -57,8 +58,8 @@ def batch(robots: int, noise: float) -> Step:
     return env.step
 
 
-def alone() -> Step:
-    env = NavigationEnv("world", source=task_among(), beams=BEAMS)
+def alone(plant: str) -> Step:
+    env = NavigationEnv("world", source=task_among(), beams=BEAMS, plant=plant)
     env.reset(seed=0)
 
     def step(actions: Any) -> None:
@@ -171,8 +172,10 @@ def main() -> None:
     steppers = {
         f"kinematic batch of {o.robots}": (batch(o.robots, 0.0), o.robots, o.steps),
         f"kinematic batch of {o.robots}, noise 1": (batch(o.robots, 1.0), o.robots, o.steps),
-        "one kinematic environment": (alone(), 1, 10 * o.steps),
+        "one kinematic environment": (alone("kinematic"), 1, 10 * o.steps),
     }
+    if hasattr(sim, "Session"):
+        steppers["one environment in physics"] = alone("bullet"), 1, 3 * o.steps
     other = ir_sim(few)
     if other is not None:
         steppers[f"ir-sim, {few} robots"] = other, few, max(o.steps // 10, 1)
