@@ -56,6 +56,8 @@ MAY_SKIP = (
     "libyaml", "compiled kernels", "drives need PyBullet",
     # other planners, whose licences or wheels differ from the project's: GPL, or built by the reader's compiler
     "the extra `peers`",
+    # packages of learning: stable-baselines3 brings 1 GB of torch
+    "the extra `gym`", "stable-baselines3",
 )  # fmt: skip
 
 

@@ -15,7 +15,18 @@ from antdrive.cli.listings import LISTS
 
 ROOT = Path(__file__).parent.parent / "src" / "antdrive"
 #: A room imports itself and the rooms of lower ranks.
-RANKS = {"base": 0, "worlds": 1, "planners": 2, "robots": 2, "sim": 3, "runs": 4, "views": 5, "testing": 6, "cli": 7}
+RANKS = {
+    "base": 0,
+    "worlds": 1,
+    "planners": 2,
+    "robots": 2,
+    "sim": 3,
+    "runs": 4,
+    "views": 5,
+    "testing": 6,
+    "gym": 6,
+    "cli": 7,
+}
 MODULES = sorted(path for room in RANKS for path in (ROOT / room).rglob("*.py"))
 #: Functions that hide a package of their name; its kernels keep this one where it is.
 HIDING = {"views.film"}

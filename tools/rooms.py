@@ -13,7 +13,7 @@ SOURCE = ROOT / "src" / "antdrive"
 PICTURE = ROOT / "docs" / "pictures" / "rooms.svg"
 ROWS = (
     ("cli",),
-    ("testing",),
+    ("testing", "gym"),
     ("views",),
     ("runs",),
     ("sim",),

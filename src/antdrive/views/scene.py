@@ -89,6 +89,12 @@ class Scene:
         )
 
     @classmethod
+    def running(cls, task: Task, robot: RobotSpec) -> Scene:
+        """Return the scene of a robot that drives without a plan."""
+        unseen, radii = np.zeros(len(task.world.obstacles), dtype=np.bool_), [m.radius for m in task.world.movers]
+        return cls._in(task.world, task, robot, unseen=unseen, inflate=0.0, margin=0.0, mover_radii=tuple(radii))
+
+    @classmethod
     def _in(cls, world: World, task: Task, robot: RobotSpec, **more: Any) -> Scene:
         discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in world.obstacles]
         obstacles = np.array(discs, dtype=np.float64).reshape(-1, 4)

@@ -1,0 +1,5 @@
+from .env import NavigationEnv as NavigationEnv
+from .rewards import Facts as Facts
+from .vector import NavigationVectorEnv as NavigationVectorEnv
+
+IDS: dict[str, str]

@@ -1,0 +1,110 @@
+"""Courses: the tasks from which an environment draws its episodes."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+from antdrive.base.caches import cached
+from antdrive.base.errors import FieldError, InputError
+from antdrive.robots import RobotSpec, overlap_at
+from antdrive.runs.barn_challenge import WORLDS, unpacked
+from antdrive.worlds import Task, Wandering, import_barn, import_dynabarn, load_task
+from antdrive.worlds.generators.generate import GENERATORS, generated
+
+Source: TypeAlias = str | os.PathLike[str] | Task
+#: Sets of third-party worlds: what `source` must name.
+SETS = {
+    "barn50": "the folder or archive of the BARN challenge's world_N.world files",
+    "dynabarn": "the JSON file of a DynaBARN set",
+}
+
+
+@dataclass(frozen=True)
+class Course:
+    """Numbered tasks."""
+
+    count: int  # how many there are
+    task: Callable[[int], Task]  # the task of a number from 0
+
+
+def course_of(
+    kind: str, robot: RobotSpec, worlds: int, source: Source | None, options: Mapping[str, Any] = MappingProxyType({})
+) -> Course:
+    """Return a course.
+
+    Args:
+        kind: a generator's name, `world`, or a name of `SETS`
+        robot: the robot, for which generated worlds have room
+        worlds: number of generated worlds
+        source: the world, or the set's file or folder
+        options: the generator's options
+
+    Raises:
+        InputError: the course is unknown, its source is missing or invalid, or there are no worlds.
+    """
+    if kind in GENERATORS:
+        if worlds < 1:
+            raise InputError(f"worlds: must be at least 1, got {worlds}")
+        room = {} if kind == "office" else {"robot_radius": round(robot.radius + 0.03, 3)}
+        given = {**room, **options}.items()
+        texts = tuple((key, ",".join(map(str, v)) if isinstance(v, tuple | list) else str(v)) for key, v in given)
+        return Course(worlds, lambda number: generated(kind, number, texts))
+    if kind == "world":
+        task = task_of("forest" if source is None else source)
+        return Course(1, lambda number: task)
+    if kind not in SETS:
+        raise InputError(f"course: unknown {kind!r}; choose from {', '.join((*GENERATORS, 'world', *SETS))}")
+    if source is None or isinstance(source, Task):
+        raise InputError(f"source: missing; name {SETS[kind]} (docs/how-to/data.md says where to get it)")
+    tasks = _barn(os.fspath(source)) if kind == "barn50" else tuple(import_dynabarn(source))
+    return Course(len(tasks), tasks.__getitem__)
+
+
+def task_of(world: Source, robot: RobotSpec | None = None, **ends: Any) -> Task:
+    """Return a task by its world's name or file, with another start or goal; the robot must fit at its start.
+
+    Raises:
+        InputError: the world is unknown or invalid, or an end is not free.
+    """
+    task = world if isinstance(world, Task) else load_task(world)
+    try:
+        given: dict[str, Any] = {key: tuple(map(float, value)) for key, value in ends.items() if value is not None}
+        for key, value in given.items():
+            if len(value) != (3 if key == "start" else 2):
+                raise FieldError(key, f"must be {'x, y and yaw' if key == 'start' else 'x and y'}, got {value}")
+        task = dataclasses.replace(task, **given) if given else task
+        overlap = "" if robot is None else overlap_at(task.world, robot, task.start)
+        if robot is not None and overlap:
+            raise FieldError("start", f"{robot.name} {overlap}; move the start away from it")
+    except FieldError as error:
+        raise error.as_input() from None
+    except (TypeError, ValueError):
+        raise InputError(f"start, goal: must be numbers, got {ends}") from None
+    return task
+
+
+def repeated(task: Task, number: int) -> Task:
+    """Return a task whose wandering movers have seeds, made from its number: each of its episodes has the same movers."""
+    movers = tuple(
+        dataclasses.replace(mover, seed=1000 * number + i)
+        if isinstance(mover, Wandering) and mover.seed is None
+        else mover
+        for i, mover in enumerate(task.world.movers)
+    )
+    if movers == task.world.movers:
+        return task
+    return dataclasses.replace(task, world=dataclasses.replace(task.world, movers=movers))
+
+
+@cached(4)
+def _barn(source: str) -> tuple[Task, ...]:
+    with tempfile.TemporaryDirectory() as folder:
+        files = unpacked(Path(source), Path(folder)).rglob(WORLDS)
+        return tuple(import_barn(path) for path in sorted(files, key=lambda path: (len(path.stem), path.stem)))
