@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from antdrive.base.checks import grouped
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.user_code import label_names
 from antdrive.cli.scenario_options import GROUPS, Setup
-from antdrive.planners.user_code import label_names
 
 MAX_PLANNERS = 6
 

@@ -98,7 +98,7 @@ class Setup:
 
         The margin "auto" calibrates the robot, unless a calibration exists.
         """
-        from antdrive.planners.registry import parse
+        from antdrive.base.registry import parse
 
         chosen: dict[str, dict[str, str]] = {group: {} for group in GROUPS}
         for text in self.settings or ():

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.user_code import is_user_code, record_name
 from antdrive.planners import PLANNERS, Planner, load_planner
 from antdrive.planners.registry import registered_name
-from antdrive.planners.user_code import is_user_code, record_name
 from antdrive.robots import list_robots
 from antdrive.sim.forms import require_settings, scenario_fields, written
 from antdrive.sim.log.record import DriveRecord, settings_of

@@ -168,7 +168,7 @@ class Written:
             at: returns the error for a key
         """
         from antdrive.planners import load_planner
-        from antdrive.planners.user_code import is_user_code
+        from antdrive.base.user_code import is_user_code
         from antdrive.robots.robot_file import list_robots
         from antdrive.worlds.files.world_file import list_worlds
 

@@ -11,8 +11,8 @@ import pytest
 
 from antdrive import Disc, Outcome, Scenario
 from antdrive.base.errors import InputError
+from antdrive.base.user_code import is_importable_elsewhere
 from antdrive.cli.commands.run import run as command
-from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.margins.choice import Calibration
 from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.suites import Baseline, load_suite, scenario_of, select

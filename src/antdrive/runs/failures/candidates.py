@@ -12,9 +12,9 @@ from pathlib import Path
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import MAX_JSON_BYTES, parse_json, read_bytes
+from antdrive.base.user_code import is_importable_elsewhere
 from antdrive.base.version import versions
 from antdrive.planners import Planner, PlannerError
-from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.failures.failure import Attempt, Failure, failure_of, failure_of_planner
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound

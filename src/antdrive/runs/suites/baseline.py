@@ -20,9 +20,9 @@ from antdrive.base.files import parse_json, read_bytes
 from antdrive.base.plane import wrap_angle
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats
+from antdrive.base.user_code import module_hash
 from antdrive.base.version import versions
 from antdrive.planners import is_built_in
-from antdrive.planners.user_code import module_hash
 from antdrive.runs.suites.nearest import ClosestApproach, nearest_of
 from antdrive.runs.suites.suite import shown_path
 from antdrive.sim.facts import facts_of

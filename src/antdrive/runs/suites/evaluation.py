@@ -15,9 +15,9 @@ import numpy as np
 
 from antdrive.base.plane import format_point
 from antdrive.base.types import Floats, Point
+from antdrive.base.user_code import module_file
 from antdrive.base.version import versions
 from antdrive.planners import is_built_in
-from antdrive.planners.user_code import module_file
 from antdrive.runs.suites.baseline import PLANNER_FILE, Baseline, configuration_hashes
 from antdrive.runs.suites.demands import END, Bound, Demands
 from antdrive.runs.suites.nearest import cause_of_contact, first_contact, first_contact_kind, nearest_of
