@@ -20,7 +20,7 @@ from typing import Any, Generic, Literal, TypeVar, Union
 from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError, InputError, visible
 from antdrive.base.guarded import OverLimit, UserCode, error_text, one_line, place
-from antdrive.base.user_code import LOADED, is_user_code, module_hash, user_code_version, user_object
+from antdrive.base.user_code import LOADED, is_user_code, module_hash, user_code_version, user_object, word_of
 from antdrive.base.version import __version__
 
 DECORATOR = "@dataclass(frozen=True, kw_only=True)"
@@ -90,6 +90,12 @@ class Registry(Generic[Component]):
                 f"(--{self.kind} FILE.py:CLASS), or register it under the entry point {self.group}"
             )
         return name if name in named else named[0]
+
+    def word_of(self, component: Component) -> str:
+        """Return the name that loads a component: registered, or FILE.py:CLASS for one made in Python."""
+        kind = type(component)
+        registered = next((name for name, one in self.all().items() if type(one) is kind), None)
+        return registered or word_of(component) or f"FILE.py:{kind.__name__}"
 
     def version(self, name: str) -> str:
         """Return the distribution and version of the component with a name; with the hash of its file if it is third-party.

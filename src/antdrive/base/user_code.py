@@ -31,6 +31,8 @@ FROM_FILE = "_antdrive_user_"  # name prefix of modules loaded from files
 
 #: Users' classes that this process has loaded, by their kinds and names in records; the latest of a name.
 LOADED: dict[tuple[str, str], Any] = {}
+#: The words that named users' code, by class: FILE.py:CLASS or MODULE:CLASS, seen from the working directory.
+_WORDS: dict[type, str] = {}
 #: The folder of each user module, by the module's name.
 _OWNERS: dict[str, Path] = {}
 #: Modules set aside while a module of the same name from another folder is in use.
@@ -100,8 +102,16 @@ def _user_object(name: str, home: Path | None, kind: type[ComponentError]) -> An
         raise _Unusable("", f"{source} names no class; write {source}:CLASS; {_choices(module, word, kind)}")
     if not hasattr(module, word):
         raise _Unusable("", f"{source} has no {word!r}; {_choices(module, word, kind)}")
-    LOADED[kind.kind, word] = getattr(module, word)
-    return LOADED[kind.kind, word]
+    made = LOADED[kind.kind, word] = getattr(module, word)
+    path = (home or Path()) / (source if is_file else f"{source}.py")
+    beside = home is not None and path.is_file()
+    _WORDS[made if isinstance(made, type) else type(made)] = f"{os.path.relpath(path)}:{word}" if beside else name
+    return made
+
+
+def word_of(component: object) -> str | None:
+    """Return the words that named a component of user code in this process, FILE.py:CLASS or MODULE:CLASS; None if none did."""
+    return _WORDS.get(type(component))
 
 
 def _import_error(source: str, kind: type[ComponentError], error: BaseException) -> Exception:

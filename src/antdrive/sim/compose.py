@@ -9,7 +9,8 @@ import dataclasses
 import math
 from typing import NamedTuple
 
-from antdrive.robots import LIMITERS, Avoidance
+from antdrive.robots import LIMITERS, Avoidance, Briefing, PurePursuit, capabilities_of_controller
+from antdrive.robots.control.controller import Following
 from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.drive import full_turn, no_scan
@@ -25,6 +26,7 @@ from antdrive.sim.driving.rules import (
     EXPLORING_LIMITERS,
     GOAL_SHARE,
     Avoid,
+    Follow,
     KeepToSchedule,
     Pursuit,
     SlowAtCorners,
@@ -69,7 +71,7 @@ def compose(s: Scenario) -> Parts:
     )
     # A scan may be one scan period old, and commands are delayed.
     reaction = 1 / hz + (1 / _lidar(s).rate if scans else 0.0) + s.robot.noise.scaled(s.noise).delay
-    rules: list[Rule] = [Pursuit(s.controller, full_turn(s.robot, hz))]
+    rules: list[Rule] = [_follow(s, movers if moving else None)]
     guide: RouteGuide
     if survey:
         guide = exploration = _exploration(s, survey)
@@ -78,7 +80,7 @@ def compose(s: Scenario) -> Parts:
         guide = _guide(s, movers, moving)
     if s.timed:
         rules.append(KeepToSchedule(guide, s.robot, hz))
-    if moving and avoidance is not None:
+    if moving and avoidance is not None and not capabilities_of_controller(s.controller).avoids_movers:
         if not mapless and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
             rules.append(SlowAtCorners(tracking, s.robot, hz, reaction))
         drifts = survey is not None and tracks_movers
@@ -86,7 +88,7 @@ def compose(s: Scenario) -> Parts:
         blind = drifts and not _lidar(s).full_circle
         backwards = BLIND_SHARE * s.robot.max_speed if blind else math.inf
         habits = Habits(movers, hz) if movers.uncertain else None
-        delay, losses = s.robot.noise.scaled(s.noise).delay, clearances_off_route(s.robot, s.controller, s.noise)
+        delay, losses = s.robot.noise.scaled(s.noise).delay, clearances_off_route(s.robot, s.pursuit, s.noise)
         rules.append(
             Avoid(
                 avoidance, movers, guide, s.task, s.robot, hz, goal_share=share, backwards=backwards, delay=delay,
@@ -117,13 +119,13 @@ def route_planner(s: Scenario) -> RoutePlanner:
         planner_label=s.planner_label,
         task=mapless_task(s.task) if s.mapless else s.task,
         robot=s.robot,
-        controller=s.controller,
+        controller=s.pursuit,
         margin=s.planned_margin,
         outline_margins=s.outline_margins,
         usual_margin=s.usual_margin,
         cell=s.planning_cell,
         smoothing=s.driven_smoothing,
-        footprint=s.footprint,
+        footprint=s.footprint if s.follows_turns else "disc",
         hz=s.control_hz,
         seed=s.seed,
         noise=s.noise,
@@ -131,6 +133,17 @@ def route_planner(s: Scenario) -> RoutePlanner:
         mapless=s.mapless,
         whole=not s.cell_by_cell,
     )
+
+
+def _follow(s: Scenario, movers: PerceivedMovers | None) -> Rule:
+    """Return the rule that follows the path: pure pursuit, or another controller on what it is given."""
+    if isinstance(s.controller, PurePursuit):
+        return Pursuit(s.controller, full_turn(s.robot, s.control_hz))
+    task = s.task
+    briefing = Briefing(
+        robot=s.robot, goal=task.goal, tolerance=task.goal_tolerance, map=None if s.mapless else task, hz=s.control_hz
+    )
+    return Follow(Following(s.controller, s.controller_label, briefing), movers, s.control_hz)
 
 
 def mapless_task(task: Task) -> Task:

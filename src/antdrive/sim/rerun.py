@@ -19,11 +19,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.base.version import versions
-from antdrive.planners import Planner, PlannerError, PlanResult, TimedPlan, is_built_in
+from antdrive.planners import Planner, PlanResult, TimedPlan, is_built_in
 from antdrive.sim.log.record import PROOFS, Proof, plain_value
 from antdrive.sim.log.rollout import FORMS, NOISY, ROWS, Rollout
 from antdrive.sim.pipeline import driven, plan
@@ -94,7 +95,7 @@ def fingerprint(s: Scenario) -> str:
             _, answer, rollout = driven(s)
             return fingerprint_of(s, answer, rollout)
         return fingerprint_of(s, plan(s)[1], None)
-    except PlannerError as error:
+    except ComponentError as error:
         return str(error)
 
 
@@ -140,7 +141,7 @@ def replayed(
     try:
         s = rerun_scenario(rollout, planner)
         answer, again = _driven(s, rollout)
-    except (PlannerError, ValueError) as error:
+    except (ComponentError, ValueError) as error:
         return ReplayCheck(False, math.nan, math.nan, math.nan, (f"replay: {error}",))
     found = sorted(mismatches(rollout, again), key=lambda one: one.row)
     wrong = [one for one in found if not one.rounded]
@@ -178,6 +179,7 @@ def rerun(rollout: Rollout, planner: Planner | str | None = None) -> Rollout:
         InputError: the planner or the controller cannot be found by its name.
         FieldError: the record is no scenario, or its plan fails.
         PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
+        ControllerError: the controller raised an exception, or its command is not a finite `Twist`.
     """
     return _driven(rerun_scenario(rollout, planner), rollout)[1]
 

@@ -144,7 +144,8 @@ class Written:
 
         auto = self.settings.get("margin") == "auto" and "margin" not in made
         with placed(at):
-            fields = scenario_fields({**self.settings, **({"margin": 0.0} if auto else {})})
+            known = {key: value for key, value in self.settings.items() if key not in made}
+            fields = scenario_fields({**known, **({"margin": 0.0} if auto else {})}, home)
             fields |= {"seed": self.seed, "planner_name": record_name(self.planner), **made}
             if "task" not in made:
                 fields["task"] = self.load_task(home)
@@ -167,8 +168,8 @@ class Written:
             home: base of relative paths
             at: returns the error for a key
         """
-        from antdrive.planners import load_planner
         from antdrive.base.user_code import is_user_code
+        from antdrive.planners import load_planner
         from antdrive.robots.robot_file import list_robots
         from antdrive.worlds.files.world_file import list_worlds
 
@@ -180,15 +181,20 @@ class Written:
                 load_planner(self.planner, **self.options)
 
     def check_settings(self, at: ErrorAt) -> None:
-        """Check the keys and values of settings; those of the controller load the compiler.
+        """Check the keys and values of settings, without user code; those of the controller load the compiler.
 
         Args:
             at: returns the error for a key
         """
+        from antdrive.base.user_code import is_user_code
         from antdrive.sim.forms import scenario_fields
 
+        chosen = self.settings.get("controller", {})
+        own = is_user_code(str(chosen.get("name", "") if isinstance(chosen, dict) else chosen))
         with placed(at):
-            scenario_fields({key: value for key, value in self.settings.items() if value != "auto"})
+            scenario_fields(
+                {key: one for key, one in self.settings.items() if one != "auto" and not (own and key == "controller")}
+            )
 
     def load_task(self, home: Path | None = None) -> Task:
         """Return the world with start and goal.

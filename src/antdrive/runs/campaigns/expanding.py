@@ -161,10 +161,21 @@ def _settings(campaign: Campaign) -> list[tuple[dict[str, Any], Location]]:
     combinations = []
     for *values, (settings, place) in itertools.product(*map(campaign.values, AXES), listed):
         given = {**settings, **dict(zip(keys, values, strict=True))}
+        if "controller" in given:
+            given["controller"] = _located(given["controller"], campaign.folder)
         with placed(campaign.at(*place)):
             scenario_fields(given)
         combinations.append((given, place))
     return combinations
+
+
+def _located(controller: Any, folder: Path) -> Any:
+    """Return a controller as files write it, with the whole path of a user's file, relative to a folder."""
+    if isinstance(controller, dict):
+        name = controller.get("name")
+        return {**controller, "name": _located(name, folder)} if isinstance(name, str) else controller
+    file, mark, word = controller.rpartition(":")
+    return f"{(folder / file).absolute()}{mark}{word}" if file.endswith(".py") else controller
 
 
 #: Locations in a campaign of a scenario's fields, where the names differ.

@@ -16,9 +16,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from antdrive.base import Floats, Pose
+from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
-from antdrive.planners import PlannerError
 from antdrive.robots import PurePursuit, TrackedPath, Twist, footprint_clearance
 from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.sim.compose import route_planner
@@ -116,7 +116,7 @@ def rehearsed_clearance(s: Scenario) -> float:
     """
     try:
         grid, answer = plan(s)
-    except PlannerError:
+    except ComponentError:
         return -math.inf
     if not answer.solved:
         return math.inf
@@ -125,7 +125,7 @@ def rehearsed_clearance(s: Scenario) -> float:
     localiser = localiser_of("fixes", s.robot, s.noise, 1.0, 1 / s.control_hz, s.task.start, s.seed)
     plant = Kinematic(s.task.start, lambda pose, twist: np.array([_moved(pose, twist, 1 / s.control_hz)]))
     limit = SETTLING + PATIENCE * route.length / s.robot.max_speed
-    drive(plant, Rehearsing(path, s.controller), localiser, hz=s.control_hz, limit=limit)
+    drive(plant, Rehearsing(path, s.pursuit), localiser, hz=s.control_hz, limit=limit)
     return float(footprint_clearance(s.driven_world, s.robot.footprint, plant.poses).min())
 
 
@@ -138,7 +138,7 @@ class Rehearsing(Decider):
 
     def decide(self, tick: int, pose: Pose, state: State) -> None:
         """Set the controller's command."""
-        self.step = Step(*self._controller.step(self._path, pose, self.step.command, self.step.pursuit))
+        self.step = Step(*self._controller.pursue(self._path, pose, self.step.command, self.step.pursuit))
 
     def gives_up(self, state: State) -> Ending | None:
         """End the drive if the robot stands at the end of the path."""

@@ -65,7 +65,7 @@ class Leaving(Decider):
         """Return the controller's command while the place is narrow."""
         if not is_narrow(self._world, self._robot, pose):
             return Ending(Outcome.SUCCEEDED)
-        self.step = Step(*self._controller.step(self._path, pose, self.step.command, self.step.pursuit))
+        self.step = Step(*self._controller.pursue(self._path, pose, self.step.command, self.step.pursuit))
         return Ending(Outcome.STUCK) if self._halts and not any(self.step.command) else None
 
 

@@ -53,7 +53,7 @@ def _rebuilt(rollout: Rollout) -> LoggedOdometry:
 
     The imports load compiled code, which tables of exact drives do not need.
     """
-    from antdrive.robots.control.pursuit import Twist
+    from antdrive.robots.control.observation import Twist
     from antdrive.sim.driving.localising import Exact, logged_localiser
     from antdrive.sim.physics.engine import State
     from antdrive.sim.sensing.pose_filter import PoseFilter

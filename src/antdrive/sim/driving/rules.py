@@ -11,7 +11,19 @@ import numpy as np
 from antdrive.base import Floats, Pose
 from antdrive.base.plane import arc_lengths
 from antdrive.planners import TimedPlan
-from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, TrackedPath, Twist
+from antdrive.robots import (
+    LIMITERS,
+    Avoidance,
+    AvoidanceState,
+    Observation,
+    PurePursuit,
+    PursuitState,
+    RobotSpec,
+    TrackedPath,
+    Twist,
+)
+from antdrive.robots.control.controller import Following
+from antdrive.robots.control.observation import NO_MOVERS
 from antdrive.sim.driving.blockage import points_at
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.parts import Guide, Moment, Step
@@ -79,6 +91,7 @@ def slow_down(command: Twist, last: Twist, limit: float, max_change: float) -> T
 
 STEPPING_OUT = 1.2  # speed of people who step out of hidden ground [m/s]
 CORNER_STEP = 0.1  # between the places of a route that are compared with corners [m]
+STANDING = 0.01  # a robot that is slower than this turns on the spot [m/s], [rad/s]
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop within this fraction of the goal's tolerance
 AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
@@ -100,8 +113,29 @@ class Pursuit:
         """Return the controller's command."""
         last, before = now.before.command, now.before.pursuit
         if now.clock.turning <= self._full_turn:
-            return Step(*self._controller.step(now.path, now.pose, last, before))
-        return Step(*self._controller.step(now.path.preferring_arcs, now.pose, last, before._replace(turning=False)))
+            return Step(*self._controller.pursue(now.path, now.pose, last, before))
+        return Step(*self._controller.pursue(now.path.preferring_arcs, now.pose, last, before._replace(turning=False)))
+
+
+class Follow:
+    """Rule: follow the path by another controller, and measure the progress along it."""
+
+    def __init__(self, following: Following, movers: PerceivedMovers | None, hz: int) -> None:
+        self._following, self._movers, self._hz = following, movers, hz
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """Return the controller's command."""
+        last, before, path = now.before.command, now.before.pursuit, now.path
+        movers = NO_MOVERS
+        if self._movers is not None:
+            at = now.tick, now.pose[:2]
+            places, radii = self._movers.predict(*at, np.zeros(1))
+            movers = np.column_stack([places[0], self._movers.velocities(*at), radii])
+        measured = Twist(now.state.speed, now.state.yaw_rate)
+        given = Observation(now.tick, now.tick / self._hz, now.pose, measured, last, movers=movers)
+        command = self._following.command(given, path)
+        turning = abs(command.speed) < STANDING and abs(command.yaw_rate) >= STANDING
+        return Step(command, PursuitState(path.nearest(now.pose, before.arc), turning))
 
 
 class TurnToScan:

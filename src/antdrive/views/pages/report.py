@@ -84,6 +84,7 @@ SENTENCES = {
     **{outcome.key: outcome.value for outcome in Outcome},
     "crashed": "the process of the run died",
     "planner_fault": "the planner raised an error",
+    "controller_fault": "the controller raised an error",
     "too_slow": "the run took longer than the campaign allows",
 }
 
