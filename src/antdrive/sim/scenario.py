@@ -179,7 +179,7 @@ class Scenario(Settings):
             planner: a planner's name, FILE.py:CLASS, MODULE:CLASS, or a planner
             robot: a robot of the catalogue, a robot file, or a specification
             options: options of a planner given by name
-            settings: fields of `Scenario`, such as noise=1.0
+            settings: fields of `Scenario`, such as noise=1.0; the controller may be a name, or a mapping as in files
 
         Raises:
             InputError: a world, planner, option or robot is unknown, or a file is invalid.
@@ -193,6 +193,8 @@ class Scenario(Settings):
         if not isinstance(planner, str) and options:
             raise FieldError("options", "need a planner's name; set the options of a planner object itself")
         words: dict[str, Any] = {"options": options or {}}
+        if isinstance(settings.get("controller"), str | dict):
+            words["settings"] = {"controller": settings.pop("controller")}
         made = dict[str, Any]()
         for key, name, value in (("world", "task", world), ("planner", "planner", planner), ("robot", "robot", robot)):
             if isinstance(value, str | os.PathLike):

@@ -271,10 +271,14 @@ class Written:
         from antdrive.worlds import list_worlds
 
         world = self.world if not isinstance(self.world, str) or self.world in list_worlds() else rename(self.world)
-        source, mark, name = self.planner.rpartition(":")
-        planner = f"{rename(source)}{mark}{name}" if source.endswith(".py") else self.planner
+
+        def code(name: str) -> str:
+            source, mark, word = name.rpartition(":")
+            return f"{rename(source)}{mark}{word}" if source.endswith(".py") else name
+
         robot = self.robot if self.robot in list_robots() else rename(self.robot)
-        return dataclasses.replace(self, world=world, planner=planner, robot=robot)
+        settings = with_controller(self.settings, code)
+        return dataclasses.replace(self, world=world, planner=code(self.planner), robot=robot, settings=settings)
 
     def seen_from_here(self, home: Path, *, anywhere: bool = False) -> Written:
         """Return the same with files relative to the working directory, and modules beside the home as files.
@@ -288,12 +292,30 @@ class Written:
             path, here = (home / name).resolve(), Path.cwd()
             return str(path if anywhere or not path.is_relative_to(here) else path.relative_to(here))
 
-        source, _, name = self.planner.rpartition(":")
-        beside = home / f"{source}.py"
-        moving = anywhere or home.resolve() != Path.cwd()
-        if source and moving and not source.endswith(".py") and beside.is_file():
-            return dataclasses.replace(self, planner=f"{beside.name}:{name}").moved(shown)
-        return self.moved(shown)
+        def code(name: str) -> str:
+            source, _, word = name.rpartition(":")
+            beside = home / f"{source}.py"
+            moving = anywhere or home.resolve() != Path.cwd()
+            is_module = source and moving and not source.endswith(".py") and beside.is_file()
+            return f"{beside.name}:{word}" if is_module else name
+
+        settings = with_controller(self.settings, code)
+        return dataclasses.replace(self, planner=code(self.planner), settings=settings).moved(shown)
+
+
+def with_controller(settings: Mapping[str, Any], rename: Callable[[str], str]) -> Mapping[str, Any]:
+    """Return settings as files write them, with another name of the controller.
+
+    Args:
+        settings: the settings by key
+        rename: returns the other name
+    """
+    value = settings.get("controller")
+    if isinstance(value, str):
+        return {**settings, "controller": rename(value)}
+    if isinstance(value, dict) and isinstance(value.get("name"), str):
+        return {**settings, "controller": {**value, "name": rename(value["name"])}}
+    return settings
 
 
 def named_task(task: Task, _: str) -> dict[str, Any]:

@@ -91,7 +91,7 @@ class Following:
         except (TypeError, ValueError):
             speed = yaw_rate = math.nan
         if not (math.isfinite(speed) and math.isfinite(yaw_rate)):
-            raise self._error(f"returned {value_text(twist, 60)}, which is not finite")
+            raise self._error(f"returned {value_text(twist, 60)}; speed and yaw rate must be finite numbers")
         return speed, yaw_rate
 
     def _error(self, problem: str) -> ControllerError:

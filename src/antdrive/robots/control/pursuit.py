@@ -35,6 +35,7 @@ from antdrive.worlds import Route, World
 from antdrive.worlds.world import by_geometry
 
 SPACING = 0.02  # distance between the samples along a route [m]
+ROUNDING = 1e-9  # a point this close to a corner is beyond it [m]
 SQUARE = 0.5  # minimum side of a square of the obstacle index [m]
 SIDE = 1  # place of the side of an index of obstacles among the numbers of a packed path
 EVERYTHING = 1e6  # side of the single square that holds all obstacles [m]
@@ -127,9 +128,9 @@ class TrackedPath:
         return float(_kernels_path.project(pose[0], pose[1], arc, window, self.samples.xy, self.samples.arc)[0])
 
     def pose_at(self, arc: float) -> Pose:
-        """Return the point of the route at an arc length [m], and the route's heading there [m, m, rad]."""
+        """Return the point of the route at an arc length [m], and the route's heading from there on [m, m, rad]."""
         xy, at = self.samples.xy, self.samples.arc
-        k = _kernels_path.segment_at(arc, at)
+        k = _kernels_path.segment_at(arc + ROUNDING, at)
         x, y, _ = _kernels_path.point_at(arc, k, xy, at)
         return x, y, math.atan2(xy[k + 1, 1] - xy[k, 1], xy[k + 1, 0] - xy[k, 0])
 
