@@ -20,10 +20,12 @@ from typing import Any, Generic, Literal, TypeVar, Union
 from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError, InputError, visible
 from antdrive.base.guarded import OverLimit, UserCode, error_text, one_line, place
+from antdrive.base.records import meanings_of
 from antdrive.base.user_code import LOADED, is_user_code, module_hash, user_code_version, user_object, word_of
 from antdrive.base.version import __version__
 
 DECORATOR = "@dataclass(frozen=True, kw_only=True)"
+LONGEST_LIST = 250  # characters of a list of choices beside close ones
 Component = TypeVar("Component")
 
 
@@ -207,6 +209,16 @@ def describe(component: object) -> str:
     return f"{summary} With {', '.join(changed)}." if changed else summary
 
 
+def options_card(component: object) -> dict[str, Any]:
+    """Return the options of a component and their meanings, as plain values."""
+    kind, names = type(component), [field.name for field in _fields(component)]
+    options = {name: getattr(component, name) for name in names}
+    plain = {
+        name: one if isinstance(one, bool | int | float | str | None) else str(one) for name, one in options.items()
+    }
+    return {"options": plain, "meanings": meanings_of(kind)}
+
+
 def parse(key: str, kind: Any, value: Any) -> Any:
     """Convert the value of an option to its type."""
     origin, members = typing.get_origin(kind), typing.get_args(kind)
@@ -291,7 +303,10 @@ def _unknown(name: str, choices: Iterable[str], what: str) -> str:
         return f"no {what} is called {name!r}; it has none"
     close = difflib.get_close_matches(name, choices, n=3)
     hint = f"did you mean {' or '.join(close)}? " if close else ""
-    return f"no {what} is called {name!r}; {hint}choose from {', '.join(choices)}"
+    listed = ", ".join(choices)
+    if close and len(listed) > LONGEST_LIST:
+        return f"no {what} is called {name!r}; {hint.rstrip()}"
+    return f"no {what} is called {name!r}; {hint}choose from {listed}"
 
 
 def _undeclared_options(kind: type, options_base: type) -> str:

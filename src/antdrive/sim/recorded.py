@@ -10,8 +10,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.base.user_code import is_user_code, record_name
 from antdrive.planners import PLANNERS, Planner, load_planner
 from antdrive.planners.registry import registered_name
-from antdrive.robots import CONTROLLERS, Controller, list_robots, load_controller
-from antdrive.robots.controllers.registry import REGISTRY
+from antdrive.robots.robot_file import list_robots
 from antdrive.sim.forms import USUAL_CONTROLLER, require_settings, scenario_fields, written
 from antdrive.sim.log.record import DriveRecord, settings_of
 from antdrive.sim.settings import SETTINGS
@@ -19,11 +18,17 @@ from antdrive.sim.written import Written, named_planner, named_robot, named_task
 from antdrive.worlds import list_worlds
 
 if TYPE_CHECKING:
+    from antdrive.robots import Controller
     from antdrive.sim.scenario import Scenario
 
 
-#: Names of built-in controllers by their names in records.
-BUILT_IN = {"PurePursuit": USUAL_CONTROLLER, **{name: name for name in CONTROLLERS}}
+def built_in_controller(name: str) -> str | None:
+    """Return the name of a record's built-in controller; None for others. Names besides `PurePursuit` load the compiler."""
+    if name == "PurePursuit":
+        return USUAL_CONTROLLER
+    from antdrive.robots import CONTROLLERS
+
+    return name if name in CONTROLLERS else None
 
 
 def controller_name(settings: Mapping[str, Any]) -> str:
@@ -98,7 +103,7 @@ def _contradicted_settings(record: DriveRecord, words: Written) -> Iterator[str]
     if words.planner in PLANNERS:
         options = settings_of(load_planner(words.planner, **options))
     yield from (f"planner.{key}" for key, value in record.planner.settings.items() if options.get(key, value) != value)
-    if record.controller.name not in BUILT_IN or is_user_code(controller_name(settings)):
+    if built_in_controller(record.controller.name) is None or is_user_code(controller_name(settings)):
         if record_name(controller_name(settings)) != record.controller.name:
             yield "controller"
         return
@@ -142,6 +147,8 @@ def rebuilt(
         word = made["planner_name"] = registered_name(name)
     else:
         word, made["planner"] = "", planner
+    from antdrive.robots.controllers.registry import REGISTRY, load_controller
+
     if isinstance(controller, str):
         if record_name(controller) != record.controller.name:
             raise InputError(
@@ -150,12 +157,12 @@ def rebuilt(
         made["controller"] = load_controller(controller, **record.controller.settings)
     elif controller is not None:
         made["controller"] = controller
-    elif record.controller.name not in BUILT_IN:
+    elif built_in_controller(record.controller.name) is None:
         made["controller"] = REGISTRY.recorded(record.controller.name, **record.controller.settings)
     try:
         settings = _settings_in_force(record)
-    except FieldError as error:
-        raise InputError(str(error.under("record"))) from None
+    except (FieldError, InputError) as error:
+        raise InputError(str(FieldError(error.key, error.problem).under("record"))) from None
     words = Written(
         world="", planner=word, options=record.planner.settings, settings=settings, seed=record.seed,
     )  # fmt: skip
@@ -176,8 +183,8 @@ def _settings_in_force(record: DriveRecord) -> dict[str, Any]:
     given: dict[str, Any] = {name: getattr(record, name) for name in plain}
     given |= {SETTINGS[name].key: value for name, value in (record.settings or {}).items()}
     given |= {"smoothing": record.smoothing.asked, "cell": record.asked_cell or record.cell}
-    if record.controller.name in BUILT_IN:
-        given["controller"] = {"name": BUILT_IN[record.controller.name], **record.controller.settings}
+    if (name := built_in_controller(record.controller.name)) is not None:
+        given["controller"] = {"name": name, **record.controller.settings}
     if record.sensing is not None:
         given |= dataclasses.asdict(record.sensing)
     switched = {"avoid": record.avoidance} if record.perception is not None else {}

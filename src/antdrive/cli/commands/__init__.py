@@ -59,7 +59,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "shrink": Command("Reduce a failure to a minimal reproducer.", "resumes plans drives"),
         "reproduce": Command("Repeat a paper's experiments and test its claims.", "resumes plans"),
         "planners": Command("List the planners, or describe some with their options."),
-        "controller": Command("List the options of the controller with default, unit and meaning."),
+        "controller": Command("List the options of pure pursuit, or describe controllers with theirs."),
         "schema": Command("Print the JSON Schema of a file type."),
         "warm": Command("Compile all planners ahead of time."),
     }

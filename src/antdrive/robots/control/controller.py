@@ -21,11 +21,22 @@ class Controller(Protocol):
     """
 
     def start(self, briefing: Briefing, path: TrackedPath) -> Any:
-        """Return the state for a new path: the first of a drive, or one after a replan."""
+        """Return the state for a new path: the first of a drive, or one after a replan.
+
+        Args:
+            briefing: the robot, its goal and its map
+            path: the route with what is prepared for it
+        """
         ...
 
     def step(self, now: Observation, path: TrackedPath, state: Any) -> tuple[Twist, Any]:
-        """Return the wanted velocity and the state for the next period. Commands are limited to what the robot can reach."""
+        """Return the wanted velocity and the state for the next period. Commands are limited to what the robot can reach.
+
+        Args:
+            now: what the robot knows
+            path: the path to follow, with the latest obstacles
+            state: the state that `start` or the last call returned
+        """
         ...
 
 

@@ -184,7 +184,10 @@ class TrackedPath:
 
 @dataclass(frozen=True, kw_only=True)
 class PurePursuit:
-    """Settings of a pure-pursuit controller.
+    """Pure pursuit whose lookahead keeps clear of obstacles; routes for footprints are lines and turns on the spot.
+
+    Known weaknesses: it follows the route and does not leave it for an obstacle that no plan knows; where no arc is clear it
+    creeps or stops.
 
     Attributes:
         lookahead_time: lookahead divided by speed; the speed is at most the clear lookahead divided by this [s]
@@ -292,11 +295,11 @@ class PurePursuit:
         return ControllerCapabilities(turns=True)
 
     def start(self, briefing: Briefing, path: TrackedPath) -> PursuitState:
-        """Return the state for a new path."""
+        """Return the state for a new path, whatever the `briefing`."""
         return PursuitState()
 
     def step(self, now: Observation, path: TrackedPath, state: PursuitState) -> tuple[Twist, PursuitState]:
-        """Return the next command and the state for the next period."""
+        """Return the command for what the robot knows `now`, and the state for the next period."""
         return self.pursue(path, now.pose, now.command, state)
 
     def pursue(

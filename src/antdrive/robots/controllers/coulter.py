@@ -33,6 +33,9 @@ class Coulter:
     `k = 2 y / L^2` (Coulter 1992, section 2). The paper assumes a vehicle that already faces along the path; here a robot turns
     on the spot while the carrot is more than `turn_above` to its side. The speed is that of `TrackedPath.speed_limit`.
 
+    Known weaknesses: it cuts corners by up to the lookahead, knows no obstacles, and weaves where the lookahead is short for
+    the speed.
+
     Attributes:
         lookahead: distance to the carrot [m]
         turn_above: bearing of the carrot above which the robot turns on the spot [rad]

@@ -46,6 +46,9 @@ class DynamicWindow:
     alignment with the target after the interval and braking. The target is a point of the path at `lookahead`, so that the
     approach follows a global plan. The robot counts as a disc, and movers as discs at rest.
 
+    Known weaknesses: it cuts corners towards its target, may stand before obstacles between it and the target, and notices
+    late that a mover approaches. On routes for footprints it cannot drive.
+
     Attributes:
         interval: time to reach a velocity of the window [s]
         lookahead: distance to the target on the path [m]

@@ -28,6 +28,9 @@ class Stanley:
     robot does not steer hard. A robot that faces away from the path by more than `turn_above` turns on the spot. The speed
     is that of `TrackedPath.speed_limit`.
 
+    Known weaknesses: it reacts to the nearest point only, so that it steers late at corners of routes without smoothing; it
+    knows no obstacles.
+
     Attributes:
         gain: k, the rate at which the cross-track error decays [1/s]
         softening: added to the speed [m/s]
