@@ -1,13 +1,17 @@
 """Controllers in scenarios: names, options, records, keys, replays, and errors of user code."""
 
 import dataclasses
+import importlib.metadata
 import math
+import re
+from pathlib import Path
 
 import pytest
 
 from antdrive.base import FieldError, InputError
+from antdrive.base.optional import CONTROLLER_GROUP
 from antdrive.base.user_code import LOADED
-from antdrive.robots import CONTROLLERS, ControllerError, PurePursuit, Twist
+from antdrive.robots import CONTROLLERS, ControllerError, PurePursuit, Twist, list_controllers
 from antdrive.robots.controllers.dwa import DynamicWindow
 from antdrive.robots.controllers.stanley import Stanley
 from antdrive.runs.campaigns import expand, make_campaign
@@ -19,6 +23,7 @@ from antdrive.sim.rerun import rerun
 from antdrive.sim.written import Written
 from antdrive.worlds import Task, World
 
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "plugin_planner"
 SHORT = Task(World("short", (0.0, 0.0, 6.0, 4.0)), (1.0, 2.0, 0.4), (4.0, 2.0))
 
 FOLLOWER = '''
@@ -231,6 +236,19 @@ def test_a_controller_that_cannot_be_made_is_invalid_input(name, problem, folder
 def test_only_controllers_are_controllers(value):
     with pytest.raises(FieldError, match="controller: must be a controller, such as PurePursuit"):
         scenario(value)
+
+
+def test_a_package_adds_a_controller(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLE))
+    project = (EXAMPLE / "pyproject.toml").read_text()
+    name, value = re.search(rf'entry-points."{CONTROLLER_GROUP}"\]\n(\w+) = "(.+)"', project).groups()
+    added = importlib.metadata.EntryPoint(name, value, CONTROLLER_GROUP)
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: [added] if group == CONTROLLER_GROUP else [])
+    assert "steady" in list_controllers()
+    driven = run(scenario({"name": "steady", "gain": 3.0}))
+    assert driven.succeeded
+    assert driven.rollout.record.controller.name == "steady"
+    assert rerun(driven.rollout).drive_digest == driven.rollout.drive_digest
 
 
 def test_a_campaign_lists_controllers_and_names_their_faults(folder):

@@ -102,9 +102,9 @@ class Setup:
         for text in self.settings or ():
             group, name, value = grouped(text, GROUPS)
             chosen[group][name] = value
-        settings = {key: value for key, value in given.items() if key != "controller" or value is not None}
+        settings = dict(given)
         if chosen["controller"]:
-            named = {"name": settings["controller"]} if "controller" in settings else {}
+            named = {"name": settings["controller"]} if settings.get("controller") else {}
             settings["controller"] = {**named, **chosen["controller"]}
         seed = settings.pop("seed", place.seed)
         words = dataclasses.replace(

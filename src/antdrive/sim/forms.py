@@ -193,8 +193,7 @@ class _Controller(Form):
     def read(self, key: str, value: Any, home: Path | None = None) -> Any:
         from antdrive.robots import load_controller
 
-        options = {} if isinstance(value, str) else dict(value)
-        name = value if isinstance(value, str) else options.pop("name", USUAL_CONTROLLER)
+        name, options = name_and_options(value)
         if not isinstance(name, str):
             raise FieldError(f"{key}.name", f"must be a name, or FILE.py:CLASS or MODULE:CLASS, got {show(name)}")
         return load_controller(name, home, **options)
@@ -211,10 +210,21 @@ class _Controller(Form):
         return " ".join([*([] if name == USUAL_CONTROLLER else [record_name(name)]), *options]) or "default"
 
     def words(self, flag: str, value: Any) -> list[str] | None:
-        options = {} if isinstance(value, str) else dict(value)
-        name = value if isinstance(value, str) else options.pop("name", USUAL_CONTROLLER)
+        name, options = name_and_options(value)
         given = [word for key, one in options.items() for word in ("--set", f"controller.{key}={option_text(one)}")]
         return [*([] if name == USUAL_CONTROLLER else [flag, name]), *given]
+
+
+def name_and_options(value: Any) -> tuple[Any, dict[str, Any]]:
+    """Return the name and the options of a controller.
+
+    Args:
+        value: the controller as files write it; None: the default
+    """
+    if isinstance(value, str):
+        return value, {}
+    options = dict(value or {})
+    return options.pop("name", USUAL_CONTROLLER), options
 
 
 def controller_words(controller: Any) -> tuple[str, dict[str, Any]]:

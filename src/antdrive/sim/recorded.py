@@ -11,7 +11,7 @@ from antdrive.base.user_code import is_user_code, record_name
 from antdrive.planners import PLANNERS, Planner, load_planner
 from antdrive.planners.registry import registered_name
 from antdrive.robots.robot_file import list_robots
-from antdrive.sim.forms import USUAL_CONTROLLER, require_settings, scenario_fields, written
+from antdrive.sim.forms import USUAL_CONTROLLER, name_and_options, require_settings, scenario_fields, written
 from antdrive.sim.log.record import DriveRecord, settings_of
 from antdrive.sim.settings import SETTINGS
 from antdrive.sim.written import Written, named_planner, named_robot, named_task
@@ -33,8 +33,7 @@ def built_in_controller(name: str) -> str | None:
 
 def controller_name(settings: Mapping[str, Any]) -> str:
     """Return the name of the controller in settings as files write them."""
-    value = settings.get("controller", {})
-    return str(value.get("name", USUAL_CONTROLLER) if isinstance(value, dict) else value)
+    return str(name_and_options(settings.get("controller"))[0])
 
 
 def written_of(record: DriveRecord) -> Written:

@@ -157,8 +157,8 @@ class Settings:
     )
     controller: "Controller" = setting(  # noqa: RUF009
         _pursuit,
-        "the controller: a name, FILE.py:CLASS or MODULE:CLASS, {name: NAME} with options, or options of pure-pursuit such as "
-        "{lookahead_time: 0.5}",
+        "the controller: a name, FILE.py:CLASS or MODULE:CLASS; in files also {name: NAME} with options, or options of "
+        "pure-pursuit alone",
         "Robot",
         "NAME",
         usual="pure-pursuit",

@@ -187,10 +187,9 @@ class Written:
             at: returns the error for a key
         """
         from antdrive.base.user_code import is_user_code
-        from antdrive.sim.forms import scenario_fields
+        from antdrive.sim.forms import name_and_options, scenario_fields
 
-        chosen = self.settings.get("controller", {})
-        own = is_user_code(str(chosen.get("name", "") if isinstance(chosen, dict) else chosen))
+        own = is_user_code(str(name_and_options(self.settings.get("controller"))[0]))
         with placed(at):
             scenario_fields(
                 {key: one for key, one in self.settings.items() if one != "auto" and not (own and key == "controller")}

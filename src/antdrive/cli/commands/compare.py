@@ -52,6 +52,10 @@ def compare(
             "-s",
         ),
     ] = None,
+    controller: Annotated[
+        list[str] | None,
+        option("NAME", "Controller; several are compared with one planner, or LABEL=NAME.  [default: pure-pursuit]"),
+    ] = None,
     robot: options.Robot = "turtlebot",
     seeds: Annotated[int, option("NUMBER", "Seeds per world, starting at --seed.", min=1, max=10_000)] = 1,
     ends: Ends,
@@ -64,7 +68,7 @@ def compare(
     json: options.Json = False,
     **given: Any,
 ) -> int:
-    """Compare planners on worlds or from campaign results.
+    """Compare planners, or controllers, on worlds or from campaign results.
 
     Worlds: pairs the planners by world and seed; planners drive their own plans, unless --smoothing is given. Figures and film
     show the first pair. Exit code 0: every run succeeded.
@@ -80,8 +84,11 @@ def compare(
     require_physics()
     check_worlds(worlds)
     places = [ends.of(world) for world in worlds]
-    entrants = entrants_of(planner, settings, robot)
-    scenarios = {label: [setup.scenario(place, given) for place in places] for label, setup in entrants.items()}
+    entrants = entrants_of(planner, settings, robot, controller)
+    scenarios = {
+        label: [one.setup.scenario(place, given | one.controller) for place in places]
+        for label, one in entrants.items()
+    }
     every = [scenario for several in scenarios.values() for scenario in several]
     names = list(dict.fromkeys(scenario.task.world.name for scenario in every))
     if len(names) < len(worlds):

@@ -36,9 +36,9 @@ def verify(
     from antdrive.sim.verifying import verify_log
     from antdrive.worlds.files.world_file import load_task
 
-    for name, given_class in (("--planner", planner), ("--controller", controller)):
+    for option_of, given_class, does in (("--planner", planner, "plans"), ("--controller", controller, "drives")):
         if given_class is not None and not replay:
-            raise InputError(f"{name}: only the replay plans and drives; add --replay")
+            raise InputError(f"{option_of}: only the replay {does}; add --replay")
     if replay:
         require_physics()
     task = None if world is None else load_task(world)
