@@ -154,7 +154,7 @@ class Registry(Generic[Component]):
                 taken = "antdrive" if entry.name in built_in else _maker(entries[entry.name])
                 warnings.warn(
                     f"{self.kind} {entry.name!r} of {_maker(entry)} is omitted: {taken} already has that name",
-                    stacklevel=4,
+                    stacklevel=3,
                 )
                 continue
             entries.setdefault(entry.name, entry)

@@ -68,21 +68,5 @@ def load_planner(name: str, home: Path | None = None, /, **options: Any) -> Plan
     return REGISTRY.load(name, home, **options)
 
 
-def list_planners() -> Mapping[str, Planner]:
-    """Return all planners by name, those of other packages last.
-
-    A planner that fails to load is omitted with a warning.
-    """
-    return REGISTRY.all()
-
-
-def planner_version(name: str) -> str:
-    """Return the distribution and version of the planner with a name, with the hash of its file for third-party planners.
-
-    Raises:
-        InputError: the planner is unknown.
-    """
-    return REGISTRY.version(name)
-
-
+list_planners, planner_version = REGISTRY.all, REGISTRY.version
 recorded_planner, registered_name = REGISTRY.recorded, REGISTRY.registered_name

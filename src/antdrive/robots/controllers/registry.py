@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -37,24 +36,4 @@ REGISTRY: Registry[Controller] = Registry(
 )
 
 
-def load_controller(name: str, home: Path | None = None, /, **options: Any) -> Controller:
-    """Return the named controller with options set.
-
-    Args:
-        name: one of `list_controllers()`, or FILE.py:CLASS or MODULE:CLASS for user code
-        home: folder of user code; None: the working directory
-        options: the controller's options by name; values may be text, as from a command line
-
-    Raises:
-        InputError: the controller or option is unknown, or the value is invalid; lists the valid choices. Its key is
-            `controller`, or `controller.` and the option.
-    """
-    return REGISTRY.load(name, home, **options)
-
-
-def list_controllers() -> Mapping[str, Controller]:
-    """Return all controllers by name, those of other packages last.
-
-    A controller that fails to load is omitted with a warning.
-    """
-    return REGISTRY.all()
+load_controller, list_controllers = REGISTRY.load, REGISTRY.all
