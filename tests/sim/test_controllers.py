@@ -21,7 +21,7 @@ from antdrive.sim import Scenario, run
 from antdrive.sim.recorded import false_words, rebuilt, written_of
 from antdrive.sim.rerun import rerun
 from antdrive.sim.written import Written
-from antdrive.worlds import Task, World
+from antdrive.worlds import Disc, Task, World
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "plugin_planner"
 SHORT = Task(World("short", (0.0, 0.0, 6.0, 4.0)), (1.0, 2.0, 0.4), (4.0, 2.0))
@@ -300,3 +300,19 @@ def test_a_state_starts_again_on_a_new_path():
     log = run(s).rollout
     assert len(starts) == 1 + sum(one.solved for one in log.record.replans)
     assert not any(starts)  # a mapless robot has no map
+
+
+def test_a_briefing_holds_neither_movers_nor_unseen_obstacles():
+    given = []
+
+    @dataclasses.dataclass(frozen=True)
+    class Reading:
+        def start(self, briefing, path):
+            given.append(briefing.map)
+
+        def step(self, now, path, state):
+            return Twist(0.0, 0.0), state
+
+    run(Scenario.of("people-crossing", "astar", controller=Reading(), unseen=(Disc(1.0, 1.0, 0.05),), time_limit=0.2))
+    assert not given[0].movers
+    assert Disc(1.0, 1.0, 0.05) not in given[0].obstacles

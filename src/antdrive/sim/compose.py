@@ -140,9 +140,8 @@ def _follow(s: Scenario, movers: PerceivedMovers | None) -> Rule:
     if isinstance(s.controller, PurePursuit):
         return Pursuit(s.controller, full_turn(s.robot, s.control_hz))
     task = s.task
-    briefing = Briefing(
-        robot=s.robot, goal=task.goal, tolerance=task.goal_tolerance, map=None if s.mapless else task, hz=s.control_hz
-    )
+    known = None if s.mapless else dataclasses.replace(task.world, movers=())
+    briefing = Briefing(robot=s.robot, goal=task.goal, tolerance=task.goal_tolerance, map=known, hz=s.control_hz)
     return Follow(Following(s.controller, s.controller_label, briefing), movers, s.control_hz)
 
 

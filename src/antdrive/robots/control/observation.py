@@ -9,7 +9,7 @@ import numpy as np
 
 from antdrive.base import Floats, Point, Pose
 from antdrive.robots.spec import RobotSpec
-from antdrive.worlds import Task
+from antdrive.worlds import World
 
 NO_MOVERS: Floats = np.empty((0, 5))
 NO_MOVERS.setflags(write=False)
@@ -57,14 +57,14 @@ class Briefing:
         robot: the robot
         goal: the goal [m, m]
         tolerance: goal tolerance [m]
-        map: the task with the world as the robot knows it; None without a map
+        map: the static obstacles; None for a mapless robot
         hz: control periods per second
     """
 
     robot: RobotSpec
     goal: Point
     tolerance: float
-    map: Task | None
+    map: World | None
     hz: int
 
 
