@@ -186,6 +186,34 @@ def _source(match: re.Match[str]) -> str:
     return f"Measured in {match[4]}: " if match[4] else "Measured: " if match[2] else ""
 
 
+def controllers() -> list[str]:
+    """Return each controller with its source, idea, equations, weaknesses, options and defaults."""
+    from antdrive.robots import CONTROLLERS, PurePursuit
+    from antdrive.sim.log.record import settings_of
+
+    lines: list[str] = []
+    for name, one in CONTROLLERS.items():
+        kind, about = type(one), inspect.cleandoc(type(one).__doc__ or "").split("\n\n")
+        source = (inspect.getdoc(sys.modules[kind.__module__]) or "").partition("\n\n")[2]
+        parts = [part for part in about if not part.startswith(("Attributes:", "Raises:"))]
+        source = "" if kind is PurePursuit else " ".join(source.split())
+        lines += [f"## `{name}`", ""]
+        for text in filter(None, (*parts, source)):
+            lines += [
+                re.sub(
+                    r"^Known weaknesses: (.)", lambda m: f"**Known weaknesses.** {m[1].upper()}", " ".join(text.split())
+                ),
+                "",
+            ]
+        if kind is not PurePursuit:  # whose options have units and routes
+            meanings = meanings_of(kind)
+            rows = [(code(key), code(value), cell(meanings[key])) for key, value in settings_of(one).items()]
+            lines += table("option, default, meaning", rows)
+        else:
+            lines += controller()
+    return lines
+
+
 def controller() -> list[str]:
     """Return each option of the controller with its default, unit and routes."""
     from antdrive.robots.control.pursuit import controller_options
@@ -368,7 +396,7 @@ def _class(part: object) -> str:
 
 #: What writes each part, by its name.
 GENERATED: dict[str, Callable[..., list[str]]] = {
-    "arrays": arrays, "commands": commands, "composition": composition, "controller": controller,
+    "arrays": arrays, "commands": commands, "composition": composition, "controllers": controllers,
     "counterparts": counterparts, "exit-codes": exit_codes, "keys": keys,
     "metrics": metrics, "outcomes": outcomes, "planner": planner, "planners": planners, "proofs": proofs, "record": record,
     "robots": robots, "tolerances": tolerances, "worlds": worlds,

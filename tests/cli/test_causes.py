@@ -11,8 +11,7 @@ import pybullet  # noqa: F401
 import pytest
 
 from antdrive import list_robots
-from antdrive.base import kernel_cache
-from antdrive.planners import user_code
+from antdrive.base import kernel_cache, user_code
 from antdrive.sim.driving.rules import Pursuit
 from antdrive.sim.rerun import UNSTEADY
 from antdrive.testing import evaluation

@@ -2,7 +2,7 @@
 
 import pytest
 
-from antdrive.planners.user_code import label_names
+from antdrive.base.user_code import label_names
 
 
 @pytest.mark.parametrize(

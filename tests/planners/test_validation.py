@@ -248,7 +248,7 @@ def test_a_planner_that_raises_is_named_with_the_place():
     line = Broken.plan.__code__.co_firstlineno + 2
     with pytest.raises(PlannerError) as error:
         request_plan(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
-    assert error.value.planner == "mine"
+    assert error.value.name == "mine"
     assert str(error.value) == f"planner mine raised KeyError: 'row\\n2' (test_validation.py:{line})"
     assert isinstance(error.value.__cause__, KeyError)
 
@@ -400,7 +400,7 @@ def test_a_planner_error_can_be_pickled():
     with pytest.raises(PlannerError) as error:
         request_plan(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
     copy = pickle.loads(pickle.dumps(error.value))
-    assert (str(copy), copy.planner, copy.problem) == (str(error.value), "mine", error.value.problem)
+    assert (str(copy), copy.name, copy.problem) == (str(error.value), "mine", error.value.problem)
 
 
 def test_input_errors_sigterm_and_ctrl_c_pass_through(signals):

@@ -207,7 +207,7 @@ def test_a_plan_of_a_user_is_refused(small_scenario):
 
 def test_a_controller_of_a_user_cannot_be_rebuilt(small_run):
     record = changed(small_run.rollout.record, "controller", name="Mine")
-    with pytest.raises(InputError, match="'Mine' cannot be rebuilt"):
+    with pytest.raises(InputError, match="'Mine' is not registered, so the run cannot be rebuilt"):
         rerun(replace(small_run.rollout, record=record))
 
 

@@ -1,4 +1,4 @@
-"""Optional packages: those of extras, imported on first use, and those that add planners."""
+"""Optional packages: those of extras, imported on first use, and those that add planners and controllers."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from antdrive.base.errors import InputError
 
 #: The entry-point group for planners of other packages: an object with a method `plan`, or its class.
 PLANNER_GROUP = "antdrive.planners"
+#: The entry-point group for controllers of other packages: an object with methods `start` and `step`, or its class.
+CONTROLLER_GROUP = "antdrive.controllers"
 
 
 def optional(module: str, extra: str, purpose: str) -> Any:

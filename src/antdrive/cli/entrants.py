@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from antdrive.base.checks import grouped
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.user_code import label_names
 from antdrive.cli.scenario_options import GROUPS, Setup
-from antdrive.planners.user_code import label_names
 
 MAX_PLANNERS = 6
 
@@ -27,14 +28,39 @@ def check_worlds(words: Sequence[str]) -> None:
             raise InputError(error.problem) from None
 
 
-def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None, robot: str) -> dict[str, Setup]:
-    """Parse `--planner NAME` and `--planner LABEL=NAME` with their `--set GROUP.KEY=VALUE`; return options of `run` by label."""
+class Entrant(NamedTuple):
+    """What is compared under a label.
+
+    Attributes:
+        setup: options of `run`
+        controller: the controller by its key in files; empty for the default
+    """
+
+    setup: Setup
+    controller: dict[str, str]
+
+
+def entrants_of(
+    planners: Sequence[str] | None,
+    settings: Sequence[str] | None,
+    robot: str,
+    controllers: Sequence[str] | None = None,
+) -> dict[str, Entrant]:
+    """Parse planners, or several controllers with one planner, written NAME or LABEL=NAME, with their `--set GROUP.KEY=VALUE`.
+
+    Return what is compared by label; a single controller is that of all.
+    """
+    follow, kind = len(controllers or ()) > 1, "planner"
     words, labels = planners or (), dict[str, str]()
+    if follow:
+        if len(words) != 1:
+            raise InputError("--planner: give one, with which several controllers are compared")
+        words, kind = controllers or (), "controller"
     for word in words:
         label, mark, name = word.partition("=")
         if not label or (mark and not name) or label in GROUPS or (mark and not re.fullmatch(r"[\w-]{1,40}", label)):
             raise InputError(
-                f"--planner {word}: must be NAME or LABEL=NAME, such as few=aco-han; labels use letters, digits, - and _"
+                f"--{kind} {word}: must be NAME or LABEL=NAME, such as few=aco-han; labels use letters, digits, - and _"
             )
         labels[label] = name if mark else label
     bare = [label for label, name in labels.items() if label == name]
@@ -42,12 +68,18 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None, 
     labels = {short.get(label, label): name for label, name in labels.items()}
     if len(labels) < len(words) or not 2 <= len(labels) <= MAX_PLANNERS:
         raise InputError(
-            f"{' '.join(['--planner', *words])}: give two to six different planners; "
+            f"{' '.join([f'--{kind}', *words])}: give two to six different {kind}s; "
             "label one to compare its options, such as --planner few=aco-han --set few.ants=10"
         )
     own: dict[str, list[str]] = {label: [] for label in labels}
     for text in settings or ():
         group, name, value = grouped(text, (*labels, *GROUPS))
         for label in labels if group in GROUPS else [group]:
-            own[label].append(f"{group if group == 'controller' else 'planner'}.{name}={value}")
-    return {label: Setup(name, own[label], robot) for label, name in labels.items()}
+            own[label].append(f"{group if group in GROUPS else kind}.{name}={value}")
+    if follow:
+        (planner,) = planners or ()
+        return {
+            label: Entrant(Setup(planner, own[label], robot), {"controller": name}) for label, name in labels.items()
+        }
+    given = {"controller": controllers[0]} if controllers else {}
+    return {label: Entrant(Setup(name, own[label], robot), given) for label, name in labels.items()}

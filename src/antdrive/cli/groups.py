@@ -218,10 +218,10 @@ def _global_options(
 
 def print_exception(error: Exception) -> None:
     """Print one line about a planner error or internal error, after the traceback if `--debug` is given."""
-    from antdrive.planners import PlannerError
+    from antdrive.base.components import ComponentError
 
     debug = print_traceback(error)
-    if isinstance(error, PlannerError):
+    if isinstance(error, ComponentError):
         message = str(error)
     else:
         message = str(input_error("internal error", type(error).__name__, *filter(None, [str(error)])))

@@ -99,14 +99,14 @@ class Setup:
 
         The margin "auto" calibrates the robot, unless a calibration exists.
         """
-        from antdrive.planners.registry import parse
-
         chosen: dict[str, dict[str, str]] = {group: {} for group in GROUPS}
         for text in self.settings or ():
             group, name, value = grouped(text, GROUPS)
             chosen[group][name] = value
-        controller = {name: parse(f"controller.{name}", float, text) for name, text in chosen["controller"].items()}
-        settings = {**given, "controller": controller}
+        settings = dict(given)
+        if chosen["controller"]:
+            named = {"name": settings["controller"]} if settings.get("controller") else {}
+            settings["controller"] = {**named, **chosen["controller"]}
         seed = settings.pop("seed", place.seed)
         words = dataclasses.replace(
             place, planner=self.planner, options=chosen["planner"], robot=self.robot, settings=settings, seed=seed

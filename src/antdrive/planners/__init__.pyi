@@ -49,6 +49,7 @@ from .registry import describe as describe
 from .registry import list_planners as list_planners
 from .registry import load_planner as load_planner
 from .registry import planner_version as planner_version
+from .registry import record_name as record_name
 from .replanners import AgentStats as AgentStats
 from .replanners import OnlineAgent as OnlineAgent
 from .replanners import ReplanFromScratch as ReplanFromScratch
@@ -58,7 +59,6 @@ from .replanners import replanner_for as replanner_for
 from .smoothing.smooth import SMOOTHINGS as SMOOTHINGS
 from .smoothing.smooth import pull_taut as pull_taut
 from .smoothing.smooth import smooth as smooth
-from .user_code import record_name as record_name
 from .validation import check_step as check_step
 from .validation import request_plan as request_plan
 from .validation import require_result as require_result

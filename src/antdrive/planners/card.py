@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
-from antdrive.base.records import meanings_of
-from antdrive.planners.plan import Planner, capabilities_of, plain
+from antdrive.base.registry import options_card
+from antdrive.planners.plan import Planner, capabilities_of
 from antdrive.planners.registry import describe
 
 
@@ -17,12 +16,5 @@ def facts_of(planner: Planner) -> dict[str, Any]:
     """
     can = capabilities_of(planner)
     footprint = "disc, footprint without movers" if can.cell_by_cell else "disc or footprint"
-    names: list[str] = (
-        [field.name for field in dataclasses.fields(planner)] if dataclasses.is_dataclass(planner) else []
-    )
-    return {
-        "about": describe(planner),
-        "plans_for": footprint if can.turns else "disc",
-        "options": {name: plain(getattr(planner, name)) for name in names},
-        "meanings": meanings_of(type(planner)),
-    }
+    about, options = describe(planner), options_card(planner)
+    return {"about": about, "plans_for": footprint if can.turns else "disc", **options}

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from antdrive.base import Floats, Pose
-from antdrive.robots.control.pursuit import Twist
+from antdrive.robots.control.observation import Twist
 from antdrive.robots.spec import Noise
 
 SLIP_TIME = 0.5  # correlation time of slip [s]

@@ -16,14 +16,15 @@ from antdrive.base.tables import marked, table
 from antdrive.sim.settings import COMPARED_SMOOTHING
 
 if TYPE_CHECKING:
-    from antdrive.planners import Planner, PlannerError
+    from antdrive.base.components import ComponentError
+    from antdrive.planners import Planner
     from antdrive.robots import RobotSpec
     from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Task
 
-PLANNER_FAULT = "planner_fault"  # outcome of a run whose planner raised an error
+FAULTS = "planner_fault", "controller_fault"  # outcomes of runs whose planner or controller raised an error
 
 COMPARED = {
     "path_length_m": "planned m",
@@ -80,10 +81,10 @@ class Compared:
     plan: bytes = b""
 
     @classmethod
-    def of(cls, label: str, s: Scenario, result: Run | PlannerError, folder: str | None) -> Compared:
+    def of(cls, label: str, s: Scenario, result: Run | ComponentError, folder: str | None) -> Compared:
         """Return a run without its log, or the error of its planner as a run."""
         if isinstance(result, Exception):
-            facts = {**s.as_dict(), "outcome": PLANNER_FAULT, "sentence": str(result), "reason": str(result)}
+            facts = {**s.as_dict(), "outcome": result.outcome, "sentence": str(result), "reason": str(result)}
             facts |= {"succeeded": False, "certificate": None, "metrics": {}, "digest": None, "folder": None}
             return cls(label, s.task.world.name, s.seed, facts)
         drive = "" if result.rollout is None else drive_hash(result.rollout)
@@ -238,17 +239,17 @@ def difference_cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 #: Makes one run of a comparison: returns the run, or its planner's error, and the folder with its files, if any.
-MakeRun: TypeAlias = "Callable[[str, Scenario], tuple[Run | PlannerError, str | None]]"
+MakeRun: TypeAlias = "Callable[[str, Scenario], tuple[Run | ComponentError, str | None]]"
 
 
-def _made(label: str, scenario: Scenario) -> tuple[Run | PlannerError, str | None]:
+def _made(label: str, scenario: Scenario) -> tuple[Run | ComponentError, str | None]:
     """Drive without writing files."""
-    from antdrive.planners import PlannerError
+    from antdrive.base.components import ComponentError
     from antdrive.sim.pipeline import run
 
     try:
         return run(scenario), None
-    except PlannerError as error:
+    except ComponentError as error:
         return error, None
 
 

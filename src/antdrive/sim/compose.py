@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 from antdrive.base.records import unchecked_copy
-from antdrive.robots import Avoidance
-from antdrive.robots.control.observation import Briefing
+from antdrive.robots import Avoidance, Briefing, PurePursuit, capabilities_of_controller
+from antdrive.robots.control.controller import Following
 from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.driver import Driver, full_turn
@@ -25,7 +25,15 @@ from antdrive.sim.driving.perceived_movers import Given, PerceivedMovers, Tracke
 from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.route_planner import RoutePlanner
 from antdrive.sim.driving.routes import OneRoute
-from antdrive.sim.driving.rules import GOAL_SHARE, Avoid, KeepToSchedule, Pursuit, SlowAtCorners, TurnToScan
+from antdrive.sim.driving.rules import (
+    GOAL_SHARE,
+    Avoid,
+    ByController,
+    KeepToSchedule,
+    Pursuit,
+    SlowAtCorners,
+    TurnToScan,
+)
 from antdrive.sim.driving.senses import MoverSense, Senses, SimulatedLidar, positioning
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverDetector, Survey, turning_room
@@ -81,7 +89,7 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
     movers: PerceivedMovers = Tracked(tracking, perception, hz) if tracking else given
     # A scan may be one scan period old, and commands are delayed.
     reaction = 1 / hz + (1 / _lidar(s).rate if scans else 0.0) + s.robot.noise.scaled(s.noise).delay
-    rules: list[Rule] = [Pursuit(s.controller, full_turn(s.robot, hz))]
+    rules: list[Rule] = [_follow(s, briefing, movers)]
     guide: RouteGuide
     if survey:
         guide = exploration = _exploration(s, survey)
@@ -90,7 +98,7 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
         guide = _guide(s, movers, moving)
     if s.timed:
         rules.append(KeepToSchedule(s.robot, hz))
-    if moving and avoidance is not None:
+    if moving and avoidance is not None and not capabilities_of_controller(s.controller).avoids_movers:
         if not mapless and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
             rules.append(SlowAtCorners(tracking, s.robot, hz, reaction))
         drifts = survey is not None and tracks_movers
@@ -98,7 +106,7 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
         blind = drifts and not _lidar(s).full_circle
         backwards = BLIND_SHARE * s.robot.max_speed if blind else math.inf
         habits = Habits(movers, hz) if movers.uncertain else None
-        delay, losses = s.robot.noise.scaled(s.noise).delay, clearances_off_route(s.robot, s.controller, s.noise)
+        delay, losses = s.robot.noise.scaled(s.noise).delay, clearances_off_route(s.robot, s.pursuit, s.noise)
         rules.append(
             Avoid(
                 avoidance, movers, s.task, s.robot, hz, goal_share=share, backwards=backwards, delay=delay,
@@ -122,13 +130,13 @@ def route_planner(s: Scenario) -> RoutePlanner:
         planner_label=s.planner_label,
         task=mapless_task(s.task) if s.mapless else s.task,
         robot=s.robot,
-        controller=s.controller,
+        controller=s.pursuit,
         margin=s.planned_margin,
         outline_margins=s.outline_margins,
         usual_margin=s.usual_margin,
         cell=s.planning_cell,
         smoothing=s.driven_smoothing,
-        footprint=s.footprint,
+        footprint=s.footprint if s.follows_turns else "disc",
         hz=s.control_hz,
         seed=s.seed,
         noise=s.noise,
@@ -136,6 +144,13 @@ def route_planner(s: Scenario) -> RoutePlanner:
         mapless=s.mapless,
         whole=not s.cell_by_cell,
     )
+
+
+def _follow(s: Scenario, briefing: Briefing, movers: PerceivedMovers) -> Rule:
+    """Return the rule that follows the path: pure pursuit, or another controller on what it is given."""
+    if isinstance(s.controller, PurePursuit):
+        return Pursuit(s.controller, full_turn(s.robot, s.control_hz))
+    return ByController(Following(s.controller, s.controller_label, briefing), movers)
 
 
 def mapless_task(task: Task) -> Task:

@@ -7,24 +7,33 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Annotated, Any, get_args
 
 from pydantic import BaseModel, Field, PlainValidator, TypeAdapter, ValidationError, WithJsonSchema
 
 from antdrive.base.checks import show, suggest
 from antdrive.base.errors import FieldError
+from antdrive.base.user_code import record_name
 from antdrive.sim.log.record import changes, plain_value, settings_of
 from antdrive.sim.policy import Perception, PerceptionKind, ReplanPolicy
 from antdrive.sim.settings import SETTINGS, DeclaredSetting
 from antdrive.worlds import Disc
 
 MAX_SEEDS = 100_000  # in one range
+USUAL_CONTROLLER = "pure-pursuit"  # its options alone name it, as in older files
 _SEEDS = re.compile(r"(\d{1,18})-(\d{1,18})")
 
 
 def _text_or_mapping(value: Any) -> Any:
     if not isinstance(value, str | dict) or not value:
         raise ValueError(f"must be a name or a mapping, got {show(value)}")
+    return value
+
+
+def _name_or_options(value: Any) -> Any:
+    if not isinstance(value, str | dict) or value == "":
+        raise ValueError(f"must be a name or a mapping of options, got {show(value)}")
     return value
 
 
@@ -68,6 +77,7 @@ SEEDS_SCHEMA: dict[str, Any] = {
 TextOrMapping = Annotated[Any, PlainValidator(_text_or_mapping), WithJsonSchema(_NAME_OR_MAPPING)]
 SeedList = Annotated[Any, PlainValidator(seed_list), WithJsonSchema(SEEDS_SCHEMA)]
 Switch = Annotated[Any, PlainValidator(_switch), WithJsonSchema(_SWITCH_SCHEMA)]
+ControllerValue = Annotated[Any, PlainValidator(_name_or_options), WithJsonSchema(_NAME_OR_MAPPING)]
 MarginValue = Annotated[Any, PlainValidator(_margin), WithJsonSchema(_MARGIN_SCHEMA)]
 
 
@@ -78,8 +88,8 @@ class Form:
     written: Any = None  # pydantic type of a file's value; None: the field's own type and bounds
     usual: Any = None  # the file's value for the default; None: the default itself
 
-    def read(self, key: str, value: Any) -> Any:
-        """Return the field's value for a file's value."""
+    def read(self, key: str, value: Any, home: Path | None = None) -> Any:
+        """Return the field's value for a file's value; `home` is the folder of user code."""
         return value
 
     def write(self, value: Any) -> Any:
@@ -101,7 +111,7 @@ class _Margin(Form):
 
 
 class _Sees(Form):
-    def read(self, key: str, value: Any) -> Perception | None:
+    def read(self, key: str, value: Any, home: Path | None = None) -> Perception | None:
         if value is None:
             return None
         kind, mark, metres = value.partition(":")
@@ -123,7 +133,7 @@ class _Sees(Form):
 
 
 class _Discs(Form):
-    def read(self, key: str, value: Any) -> tuple[Disc, ...]:
+    def read(self, key: str, value: Any, home: Path | None = None) -> tuple[Disc, ...]:
         return tuple(Disc(**disc) if isinstance(disc, dict) else disc for disc in value)
 
     def write(self, value: Any) -> Any:
@@ -150,7 +160,7 @@ class _Record(Form):
         """The default record, created on request because it may load a compiler."""
         return SETTINGS[self.name].default
 
-    def read(self, key: str, value: Any) -> Any:
+    def read(self, key: str, value: Any, home: Path | None = None) -> Any:
         if not isinstance(value, dict):
             return self.default
         known = [field.name for field in dataclasses.fields(self.default)]
@@ -176,8 +186,57 @@ class _Record(Form):
             or "default"
         )
 
+
+class _Controller(Form):
+    """Form of a controller: its name, a mapping {name: NAME} with options, or the options of pure pursuit alone."""
+
+    def read(self, key: str, value: Any, home: Path | None = None) -> Any:
+        from antdrive.robots import load_controller
+
+        name, options = name_and_options(value)
+        if not isinstance(name, str):
+            raise FieldError(f"{key}.name", f"must be a name, or FILE.py:CLASS or MODULE:CLASS, got {show(name)}")
+        return load_controller(name, home, **options)
+
+    def write(self, value: Any) -> Any:
+        name, changed = controller_words(value)
+        if name == USUAL_CONTROLLER:
+            return changed
+        return {"name": name, **changed} if changed else name
+
+    def column(self, value: Any) -> Any:
+        name, changed = controller_words(value)
+        options = [f"{key}={option_text(one)}" for key, one in settings_of(changed).items()]
+        return " ".join([*([] if name == USUAL_CONTROLLER else [record_name(name)]), *options]) or "default"
+
     def words(self, flag: str, value: Any) -> list[str] | None:
-        return [word for name, one in value.items() for word in ("--set", f"controller.{name}={option_text(one)}")]
+        name, options = name_and_options(value)
+        given = [word for key, one in options.items() for word in ("--set", f"controller.{key}={option_text(one)}")]
+        return [*([] if name == USUAL_CONTROLLER else [flag, name]), *given]
+
+
+def name_and_options(value: Any) -> tuple[Any, dict[str, Any]]:
+    """Return the name and the options of a controller.
+
+    Args:
+        value: the controller as files write it; None: the default
+    """
+    if isinstance(value, str):
+        return value, {}
+    options = dict(value or {})
+    return options.pop("name", USUAL_CONTROLLER), options
+
+
+def controller_words(controller: Any) -> tuple[str, dict[str, Any]]:
+    """Return the name that loads a controller, and its options that differ from the defaults.
+
+    Args:
+        controller: the controller
+    """
+    from antdrive.robots.controllers.registry import REGISTRY
+
+    name, record = REGISTRY.word_of(controller), dataclasses.is_dataclass(controller)
+    return name, changes(controller, REGISTRY.all().get(name) or type(controller)()) if record else {}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -186,7 +245,7 @@ class _Switched(_Record):
 
     off: Any = None
 
-    def read(self, key: str, value: Any) -> Any:
+    def read(self, key: str, value: Any, home: Path | None = None) -> Any:
         return None if value == "none" else self.off if value is False else super().read(key, value)
 
     def write(self, value: Any) -> Any:
@@ -204,7 +263,7 @@ FORMS: Mapping[str, Form] = {
     "margin": _Margin(MarginValue),
     "perception": _Sees(str | None),
     "discs": _Discs(list[Disc], []),
-    "controller": _Record(dict[str, float], {}, "controller"),
+    "controller": _Controller(ControllerValue, {}),
     "avoidance": _Switched(Switch, True, "avoidance"),
     "replanning": _Switched(Switch, True, "replanning", ReplanPolicy(around_movers=False)),
 }
@@ -244,10 +303,15 @@ def written_default(one: DeclaredSetting) -> Any:
     return Field(default, description=text)
 
 
-def scenario_fields(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a scenario's fields for the values of a file, by name; defaults for the rest."""
+def scenario_fields(given: Mapping[str, Any], home: Path | None = None) -> dict[str, Any]:
+    """Return a scenario's fields for the values of a file, by name; defaults for the rest.
+
+    Args:
+        given: the values by key
+        home: folder of user code; None: the working directory
+    """
     return {
-        one.name: form_of(one).read(one.key, given[one.key]) if one.key in given else one.default
+        one.name: form_of(one).read(one.key, given[one.key], home) if one.key in given else one.default
         for one in SETTINGS.values()
     }
 

@@ -47,6 +47,8 @@ def on_other_routes(s: Scenario, key: str) -> str:
     from antdrive.robots.control.pursuit import CORNERS, SMOOTH, controller_options
 
     options, name = controller_options(), key.partition(".")[2]
+    if name not in options:
+        return ""
     raw = s.driven_smoothing == "none"
     if options[name].acts_on is SMOOTH and raw:
         return f"routes without smoothing have corners; set controller.corner_{name}"

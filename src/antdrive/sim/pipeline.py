@@ -213,6 +213,7 @@ def run(
 
     Raises:
         PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
+        ControllerError: the controller raised an exception, or its command is not a finite `Twist`.
     """
     with progress_bar(progress, f"{s.planner_label} in {s.task.world.name}") as update:
         grid, answer, rollout = driven(s, planned, update)

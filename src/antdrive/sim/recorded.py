@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.user_code import is_user_code, record_name
 from antdrive.planners import PLANNERS, Planner, load_planner
 from antdrive.planners.registry import registered_name
-from antdrive.planners.user_code import is_user_code, record_name
-from antdrive.robots import list_robots
-from antdrive.sim.forms import require_settings, scenario_fields, written
+from antdrive.robots.robot_file import list_robots
+from antdrive.sim.forms import USUAL_CONTROLLER, name_and_options, require_settings, scenario_fields, written
 from antdrive.sim.log.record import DriveRecord, settings_of
 from antdrive.sim.settings import SETTINGS
 from antdrive.sim.written import Written, named_planner, named_robot, named_task
 from antdrive.worlds import list_worlds
 
 if TYPE_CHECKING:
+    from antdrive.robots import Controller
     from antdrive.sim.scenario import Scenario
+
+
+def built_in_controller(name: str) -> str | None:
+    """Return the name of a record's built-in controller; None for others. Names besides `PurePursuit` load the compiler."""
+    if name == "PurePursuit":
+        return USUAL_CONTROLLER
+    from antdrive.robots import CONTROLLERS
+
+    return name if name in CONTROLLERS else None
+
+
+def controller_name(settings: Mapping[str, Any]) -> str:
+    """Return the name of the controller in settings as files write them."""
+    return str(name_and_options(settings.get("controller"))[0])
 
 
 def written_of(record: DriveRecord) -> Written:
@@ -87,7 +102,9 @@ def _contradicted_settings(record: DriveRecord, words: Written) -> Iterator[str]
     if words.planner in PLANNERS:
         options = settings_of(load_planner(words.planner, **options))
     yield from (f"planner.{key}" for key, value in record.planner.settings.items() if options.get(key, value) != value)
-    if record.controller.name != "PurePursuit":
+    if built_in_controller(record.controller.name) is None or is_user_code(controller_name(settings)):
+        if record_name(controller_name(settings)) != record.controller.name:
+            yield "controller"
         return
     chosen = settings.get("margin") == "auto" and record.margin_choice is not None
     fields = scenario_fields({key: value for key, value in settings.items() if key != "margin" or not chosen})
@@ -101,13 +118,16 @@ def _contradicted_settings(record: DriveRecord, words: Written) -> Iterator[str]
     yield from (key for key in keys if key not in unknown and given.get(key) != in_force.get(key))
 
 
-def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenario:
+def rebuilt(
+    record: DriveRecord, planner: Planner | str | None = None, controller: Controller | str | None = None
+) -> Scenario:
     """Return the scenario of a log's record. With the same versions it gives the same drive, bit for bit.
 
     Args:
         record: the record of a log
         planner: the planner; FILE.py:CLASS or MODULE:CLASS: custom code with the record's settings; None: the planner of
             the record's name, with the record's settings
+        controller: the controller, likewise
 
     Raises:
         InputError: the planner or controller cannot be found by its name, or has custom settings.
@@ -126,10 +146,22 @@ def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenar
         word = made["planner_name"] = registered_name(name)
     else:
         word, made["planner"] = "", planner
+    from antdrive.robots.controllers.registry import REGISTRY, load_controller
+
+    if isinstance(controller, str):
+        if record_name(controller) != record.controller.name:
+            raise InputError(
+                f"controller: the log's controller is {record.controller.name!r:.60}, not {record_name(controller)!r:.60}"
+            )
+        made["controller"] = load_controller(controller, **record.controller.settings)
+    elif controller is not None:
+        made["controller"] = controller
+    elif built_in_controller(record.controller.name) is None:
+        made["controller"] = REGISTRY.recorded(record.controller.name, **record.controller.settings)
     try:
         settings = _settings_in_force(record)
-    except FieldError as error:
-        raise InputError(str(error.under("record"))) from None
+    except (FieldError, InputError) as error:
+        raise InputError(str(FieldError(error.key, error.problem).under("record"))) from None
     words = Written(
         world="", planner=word, options=record.planner.settings, settings=settings, seed=record.seed,
     )  # fmt: skip
@@ -146,13 +178,12 @@ def _settings_in_force(record: DriveRecord) -> dict[str, Any]:
     Raises:
         FieldError: a setting is unknown or invalid.
     """
-    if record.controller.name != "PurePursuit":
-        raise FieldError("controller.name", f"{record.controller.name!r:.60} cannot be rebuilt; only PurePursuit can")
     plain = ("noise", "margin", "time_limit", "physics_hz", "control_hz", "unseen")
     given: dict[str, Any] = {name: getattr(record, name) for name in plain}
     given |= {SETTINGS[name].key: value for name, value in (record.settings or {}).items()}
     given |= {"smoothing": record.smoothing.asked, "cell": record.asked_cell or record.cell}
-    given["controller"] = dict(record.controller.settings)
+    if (name := built_in_controller(record.controller.name)) is not None:
+        given["controller"] = {"name": name, **record.controller.settings}
     if record.sensing is not None:
         given |= dataclasses.asdict(record.sensing)
     switched = {"avoid": record.avoidance} if record.perception is not None else {}

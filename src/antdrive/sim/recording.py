@@ -14,6 +14,7 @@ from antdrive.sim.log.record import (
     PlanRecord,
     finite_or_none,
     free_radius,
+    options_of,
     settings_of,
 )
 from antdrive.sim.log.streams import random_stream
@@ -35,7 +36,7 @@ def configuration_of(s: Scenario, grid: Grid, answer: PlanResult) -> dict[str, A
         "seed": s.seed,
         "planner": ComponentRecord(name=s.planner_label, settings=settings_of(answer.options)),
         "robot": s.robot,
-        "controller": ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
+        "controller": ComponentRecord(name=s.controller_label, settings=options_of(s.controller)),
         "perception": PerceptionRecord(kind=perception.kind, range_m=finite_or_none(perception.range))
         if perception
         else None,

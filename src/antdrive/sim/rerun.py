@@ -19,11 +19,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.base.version import versions
-from antdrive.planners import Planner, PlannerError, PlanResult, TimedPlan, is_built_in
+from antdrive.planners import Planner, PlanResult, TimedPlan, is_built_in
+from antdrive.robots import Controller
 from antdrive.sim.log.record import PROOFS, Proof, plain_value
 from antdrive.sim.log.rollout import FORMS, NOISY, ROWS, Rollout
 from antdrive.sim.pipeline import driven, plan
@@ -88,11 +90,11 @@ class Mismatch:
 def fingerprint(s: Scenario) -> str:
     """Return a hash of a scenario's plan, and of its drive if the robot replans; of the message if the planner raises."""
     try:
-        if s.moving or s.mapless:
+        if _drives_count(s):
             _, answer, rollout = driven(s)
             return fingerprint_of(s, answer, rollout)
         return fingerprint_of(s, plan(s)[1], None)
-    except PlannerError as error:
+    except ComponentError as error:
         return str(error)
 
 
@@ -108,24 +110,33 @@ def fingerprint_of(s: Scenario, answer: PlanResult, rollout: Rollout | None) -> 
     sha = hashlib.sha256(answer.status.name.encode())
     for array in (answer.line, *times):
         sha.update(array.tobytes())
-    if rollout is not None and (s.moving or s.mapless):
+    if rollout is not None and _drives_count(s):
         sha.update(rollout.drive_digest.encode())
     return sha.hexdigest()
 
 
+def _drives_count(s: Scenario) -> bool:
+    """Return whether a drive can differ for equal plans: the robot replans, or follows by user code."""
+    return s.moving or s.mapless or not is_built_in(s.controller)
+
+
 def is_unsteady(s: Scenario, first: str, elsewhere: Callable[[], str | None] = lambda: None) -> bool:
-    """Return whether a custom planner gives another plan for the same seed, here or in a new process.
+    """Return whether a custom planner or controller gives another run for the same seed, here or in a new process.
 
     Args:
         s: the scenario
         first: `fingerprint_of` its run
         elsewhere: returns `fingerprint(s)` of a new process; None if that is unknown
     """
-    return not is_built_in(s.planner) and (fingerprint(s) != first or elsewhere() not in (None, first))
+    custom = not (is_built_in(s.planner) and is_built_in(s.controller))
+    return custom and (fingerprint(s) != first or elsewhere() not in (None, first))
 
 
 def replayed(
-    rollout: Rollout, planner: Planner | str | None = None, elsewhere: Callable[[], str | None] = lambda: None
+    rollout: Rollout,
+    planner: Planner | str | None = None,
+    elsewhere: Callable[[], str | None] = lambda: None,
+    controller: Controller | str | None = None,
 ) -> ReplayCheck:
     """Drive a log's scenario again, and compare every value.
 
@@ -134,11 +145,12 @@ def replayed(
         planner: the planner; FILE.py:CLASS or MODULE:CLASS: custom code with the record's settings; None: the registered
             planner of the record's name
         elsewhere: returns `rerun_fingerprint` of the log in a new process; None if that is unknown
+        controller: the controller, likewise
     """
     try:
-        s = rerun_scenario(rollout, planner)
+        s = rerun_scenario(rollout, planner, controller)
         answer, again = _driven(s, rollout)
-    except (PlannerError, ValueError) as error:
+    except (ComponentError, ValueError) as error:
         return ReplayCheck(False, math.nan, math.nan, math.nan, (f"replay: {error}",))
     found = sorted(mismatches(rollout, again), key=lambda one: one.row)
     wrong = [one for one in found if not one.rounded]
@@ -155,41 +167,51 @@ def replayed(
     return ReplayCheck(not found, *offsets(rollout, again), tuple(problems), rounded)
 
 
-def rerun_fingerprint(log: Path, planner: Planner | str | None = None) -> str:
+def rerun_fingerprint(
+    log: Path, planner: Planner | str | None = None, controller: Controller | str | None = None
+) -> str:
     """Return the `fingerprint` of a log's scenario.
 
     Args:
         log: the log's file
         planner: as in `rebuilt`
+        controller: as in `rebuilt`
     """
-    return fingerprint(rerun_scenario(Rollout.load(log), planner))
+    return fingerprint(rerun_scenario(Rollout.load(log), planner, controller))
 
 
-def rerun(rollout: Rollout, planner: Planner | str | None = None) -> Rollout:
+def rerun(
+    rollout: Rollout, planner: Planner | str | None = None, controller: Controller | str | None = None
+) -> Rollout:
     """Drive the scenario of a log again, for little longer than the log.
 
     Args:
         rollout: the log
         planner: as in `rebuilt`
+        controller: as in `rebuilt`
 
     Raises:
         InputError: the planner or the controller cannot be found by its name.
         FieldError: the record is no scenario, or its plan fails.
         PlannerError: the planner raised an exception, or its answer is not a `PlanResult`.
+        ControllerError: the controller raised an exception, or its command is not a finite `Twist`.
     """
-    return _driven(rerun_scenario(rollout, planner), rollout)[1]
+    return _driven(rerun_scenario(rollout, planner, controller), rollout)[1]
 
 
-def rerun_scenario(rollout: Rollout, planner: Planner | str | None = None) -> Scenario:
+def rerun_scenario(
+    rollout: Rollout, planner: Planner | str | None = None, controller: Controller | str | None = None
+) -> Scenario:
     """Return the scenario of a log for a drive that lasts little longer than the log.
 
     Args:
         rollout: the log
         planner: as in `rebuilt`
+        controller: as in `rebuilt`
     """
     record = rollout.record
     limit = min(record.time_limit, float(rollout.t[-1]) + LONGER)
-    return dataclasses.replace(rebuilt(record, planner), planner_name=record.planner.name, time_limit=limit)
+    return dataclasses.replace(rebuilt(record, planner, controller), planner_name=record.planner.name, time_limit=limit)
 
 
 def _driven(s: Scenario, rollout: Rollout) -> tuple[PlanResult, Rollout]:

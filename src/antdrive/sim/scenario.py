@@ -8,16 +8,19 @@ import json
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from antdrive.base.checks import suggest
+from antdrive.base.components import is_built_in
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_position
+from antdrive.base.user_code import is_user_code, module_hash
 from antdrive.planners import Planner, capabilities_of
-from antdrive.robots import RobotSpec, overlap_at
+from antdrive.robots import Controller, PurePursuit, RobotSpec, capabilities_of_controller, overlap_at
 from antdrive.robots.control.speed_limits import heading_error, steady
+from antdrive.robots.controllers.registry import REGISTRY as CONTROLLER_REGISTRY
 from antdrive.robots.default_margin import default_margin, outline_margins
 from antdrive.sim.log.record import (
     DriveRecord,
@@ -25,6 +28,7 @@ from antdrive.sim.log.record import (
     SensingRecord,
     canonical_hash,
     changes,
+    options_of,
     require_factors,
     settings_of,
 )
@@ -38,9 +42,6 @@ DRIFTING = "odometry", "matching"  # localisation without fixes
 KEY_DIGITS = 32  # hexadecimal digits of a key; two of 10^9 runs collide with probability 1e-21
 FINE = 0.05  # largest planning cell without a map [m]
 NO_LIDAR = "has no lidar; add one to its file, or drive jackal or turtlebot4"
-
-if TYPE_CHECKING:
-    from antdrive.robots import PurePursuit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,12 +112,14 @@ class Scenario(Settings):
         if self.planner is None or issubclass(type(self.planner), type):
             raise FieldError("planner", f"must be a planner, such as AStar(), got {self.planner!r:.60}")
         kinds: dict[str, type] = {"task": Task, "robot": RobotSpec, "perception": Perception, "unseen": tuple}
-        kinds |= {name: type(SETTINGS[name].default) for name in ("controller", "avoidance", "replanning")}
+        kinds |= {name: type(SETTINGS[name].default) for name in ("avoidance", "replanning")}
         for name, kind in kinds.items():
             value, optional = getattr(self, name), name in ("perception", "avoidance", "replanning")
             if not isinstance(value, kind) and not (optional and value is None):
                 wanted = f"{kind.__name__} or None" if optional else kind.__name__
                 raise FieldError(name, f"must be a {wanted}, got {value!r:.60}")
+        if isinstance(self.controller, type) or not isinstance(self.controller, Controller):
+            raise FieldError("controller", f"must be a controller, such as PurePursuit(), got {self.controller!r:.60}")
         if not all(isinstance(disc, Disc) for disc in self.unseen):
             raise FieldError("unseen", f"must hold Disc objects, got {self.unseen!r:.60}")
 
@@ -143,6 +146,8 @@ class Scenario(Settings):
         if not self.mapless and self.localisation == "matching":
             raise FieldError("localisation", "matching: needs map none, since scans are matched to the occupancy map")
         can = capabilities_of(self.planner)
+        if self.footprint == "exact" and not self.robot.footprint.is_disc and not self.follows_turns:
+            raise FieldError("footprint", f"exact: {self.controller_label} follows no routes with turns on the spot")
         if self.footprint == "exact" and not self.plans_footprints and not self.robot.footprint.is_disc:
             among = " among movers" if can.turns else ""
             raise FieldError(
@@ -174,7 +179,7 @@ class Scenario(Settings):
             planner: a planner's name, FILE.py:CLASS, MODULE:CLASS, or a planner
             robot: a robot of the catalogue, a robot file, or a specification
             options: options of a planner given by name
-            settings: fields of `Scenario`, such as noise=1.0
+            settings: fields of `Scenario`, such as noise=1.0; the controller may be a name, or a mapping as in files
 
         Raises:
             InputError: a world, planner, option or robot is unknown, or a file is invalid.
@@ -188,6 +193,8 @@ class Scenario(Settings):
         if not isinstance(planner, str) and options:
             raise FieldError("options", "need a planner's name; set the options of a planner object itself")
         words: dict[str, Any] = {"options": options or {}}
+        if isinstance(settings.get("controller"), str | dict):
+            words["settings"] = {"controller": settings.pop("controller")}
         made = dict[str, Any]()
         for key, name, value in (("world", "task", world), ("planner", "planner", planner), ("robot", "robot", robot)):
             if isinstance(value, str | os.PathLike):
@@ -206,9 +213,12 @@ class Scenario(Settings):
         fields |= {"margin": self.planned_margin, "perception": self.known_perception}
         fields |= {name: known.pop(name) for name in fields.keys() & known.keys()}
         planner: Any = self.planner
+        if not isinstance(self.controller, PurePursuit):
+            own = {} if is_built_in(self.controller) else {"file": module_hash(type(self.controller).__module__)}
+            fields["controller"] = {"name": self.controller_label, **options_of(self.controller), **own}
         parts = {
             "planner": self.planner_label,
-            "options": settings_of(planner) if dataclasses.is_dataclass(planner) else {},
+            "options": options_of(planner),
         }
         parts |= {name: canonical_hash(getattr(self, name)) for name in ("task", "robot") if name not in known}
         return json.dumps({**parts, **known, "settings": settings_of(part_of_key(fields))}, sort_keys=True)
@@ -223,7 +233,7 @@ class Scenario(Settings):
         """Factors of the loss of margin."""
         return LossFactors(
             robot=self.robot,
-            controller=self.controller,
+            controller=self.pursuit,
             noise=float(self.noise),
             smoothing=self.driven_smoothing,
             outlined=self.footprint == "exact" and not self.robot.footprint.is_disc,
@@ -245,8 +255,13 @@ class Scenario(Settings):
         there is none.
         """
         task, planner = self.task, self.planner
-        changed: dict[str, Any] = {}
-        for key in ("controller", "perception", "avoidance", "replanning"):
+        from antdrive.sim.forms import form_of
+
+        controller = form_of(SETTINGS["controller"]).write(self.controller)
+        changed: dict[str, Any] = {
+            "controller": settings_of(controller) if isinstance(controller, dict) else controller
+        }
+        for key in ("perception", "avoidance", "replanning"):
             value = self.known_perception if key == "perception" else getattr(self, key)
             usual = Perception() if key == "perception" else SETTINGS[key].default
             changed[key] = None if value is None else settings_of(changes(value, usual))
@@ -260,7 +275,7 @@ class Scenario(Settings):
             "planner": self.planner_label,
             "robot": self.robot.name,
             "seed": self.seed,
-            "options": settings_of(planner) if dataclasses.is_dataclass(planner) else {},
+            "options": options_of(planner),
             "smoothing": self.smoothing,
             "noise": self.noise,
             "margin_m": self.planned_margin,
@@ -278,6 +293,22 @@ class Scenario(Settings):
     def planner_label(self) -> str:
         """The planner's name in records."""
         return self.planner_name or type(self.planner).__name__
+
+    @property
+    def controller_label(self) -> str:
+        """The controller's name in records: `PurePursuit`, the registered name, or the class."""
+        name = CONTROLLER_REGISTRY.word_of(self.controller)
+        return type(self.controller).__name__ if is_user_code(name) or name == "pure-pursuit" else name
+
+    @property
+    def pursuit(self) -> PurePursuit:
+        """The controller if it is pure pursuit, else pure pursuit with its defaults, which prepares paths and sets margins."""
+        return self.controller if isinstance(self.controller, PurePursuit) else PurePursuit()
+
+    @property
+    def follows_turns(self) -> bool:
+        """Whether the controller follows routes with turns on the spot."""
+        return capabilities_of_controller(self.controller).turns
 
     @property
     def inflate(self) -> float:
@@ -304,7 +335,7 @@ class Scenario(Settings):
         """
         margin, of_disc = self.planned_margin, self.chosen is not None and self.footprint == "auto"
         of_lines = of_disc or margin == self.usual_margin
-        return outline_margins(self.robot, self.controller, self.noise, margin, of_lines=of_lines)
+        return outline_margins(self.robot, self.pursuit, self.noise, margin, of_lines=of_lines)
 
     @property
     def driven_world(self) -> World:
@@ -353,7 +384,7 @@ class Scenario(Settings):
     @property
     def plans_footprints(self) -> bool:
         """Whether plans may keep the robot's footprint clear; a planner that decides cell by cell knows no headings."""
-        return capabilities_of(self.planner).turns and not self.cell_by_cell
+        return capabilities_of(self.planner).turns and not self.cell_by_cell and self.follows_turns
 
     @property
     def driven_smoothing(self) -> str:

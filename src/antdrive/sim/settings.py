@@ -21,7 +21,7 @@ from antdrive.sim import idle_settings
 from antdrive.sim.policy import Perception, ReplanPolicy
 
 if TYPE_CHECKING:
-    from antdrive.robots import Avoidance, PurePursuit
+    from antdrive.robots import Avoidance, Controller, PurePursuit
     from antdrive.worlds import Disc
 
 #: The panels of `--help`, in order.
@@ -155,11 +155,13 @@ class Settings:
         since=2,
         idle=idle_settings.without_odometry,
     )
-    controller: "PurePursuit" = setting(  # noqa: RUF009
+    controller: "Controller" = setting(  # noqa: RUF009
         _pursuit,
-        "settings of the controller, such as {lookahead_time: 0.5}",
+        "the controller: a name, FILE.py:CLASS or MODULE:CLASS; in files also {name: NAME} with options, or options of "
+        "pure-pursuit alone",
         "Robot",
-        flag="",
+        "NAME",
+        usual="pure-pursuit",
         form="controller",
         idle=idle_settings.on_other_routes,
     )
@@ -264,7 +266,7 @@ class DeclaredSetting:
     @property
     def is_word(self) -> bool:
         """Whether a single word is a value, so that a list of words is a list of values; seeds have their own notation."""
-        return self.setting.form in ("plain", "margin", "perception") and self.name != "seed"
+        return self.setting.form in ("plain", "margin", "perception", "controller") and self.name != "seed"
 
     @property
     def default(self) -> Any:
@@ -276,7 +278,7 @@ class DeclaredSetting:
         """Return the keys under which a value differs from the default: those of changed options, or the setting's own."""
         if value == self.default:
             return []
-        if self.setting.form != "controller":
+        if self.setting.form != "controller" or type(value) is not type(self.default):
             return [self.key]
         names = (one.name for one in dataclasses.fields(value))
         return [f"{self.key}.{name}" for name in names if getattr(value, name) != getattr(self.default, name)]

@@ -75,6 +75,7 @@ def verify_log(
     *,
     replay: bool,
     planner: str | None = None,
+    controller: str | None = None,
     elsewhere: Callable[[], str | None] = lambda: None,
 ) -> dict[str, Any]:
     """Certify a log; compare it with a world, a robot and its `result.json`; with `replay`, drive it again.
@@ -86,7 +87,8 @@ def verify_log(
         result: the `result.json` beside the log; None: none
         replay: whether to drive the log again
         planner: FILE.py:CLASS or MODULE:CLASS of a planner that is not registered, for the replay
-        elsewhere: returns `rerun_fingerprint(log, planner)` of a new process, for the replay; None if that is unknown
+        controller: the same of a controller
+        elsewhere: returns `rerun_fingerprint(log, planner, controller)` of a new process, for the replay; None if that is unknown
     """
     rollout = Rollout.load(log)
     logged = LoggedRun.of(rollout)
@@ -102,7 +104,7 @@ def verify_log(
     if replay:
         from antdrive.sim.rerun import replayed
 
-        check = replayed(rollout, planner, elsewhere)
+        check = replayed(rollout, planner, elsewhere, controller)
         results["replay"] = check.as_dict()
         problems += check.problems
         sentence += f"; {check.sentence}"

@@ -144,7 +144,8 @@ class Written:
 
         auto = self.settings.get("margin") == "auto" and "margin" not in made
         with placed(at):
-            fields = scenario_fields({**self.settings, **({"margin": 0.0} if auto else {})})
+            known = {key: value for key, value in self.settings.items() if key not in made}
+            fields = scenario_fields({**known, **({"margin": 0.0} if auto else {})}, home)
             fields |= {"seed": self.seed, "planner_name": record_name(self.planner), **made}
             if "task" not in made:
                 fields["task"] = self.load_task(home)
@@ -167,8 +168,8 @@ class Written:
             home: base of relative paths
             at: returns the error for a key
         """
+        from antdrive.base.user_code import is_user_code
         from antdrive.planners import load_planner
-        from antdrive.planners.user_code import is_user_code
         from antdrive.robots.robot_file import list_robots
         from antdrive.worlds.files.world_file import list_worlds
 
@@ -180,15 +181,19 @@ class Written:
                 load_planner(self.planner, **self.options)
 
     def check_settings(self, at: ErrorAt) -> None:
-        """Check the keys and values of settings; those of the controller load the compiler.
+        """Check the keys and values of settings, without user code; those of the controller load the compiler.
 
         Args:
             at: returns the error for a key
         """
-        from antdrive.sim.forms import scenario_fields
+        from antdrive.base.user_code import is_user_code
+        from antdrive.sim.forms import name_and_options, scenario_fields
 
+        own = is_user_code(str(name_and_options(self.settings.get("controller"))[0]))
         with placed(at):
-            scenario_fields({key: value for key, value in self.settings.items() if value != "auto"})
+            scenario_fields(
+                {key: one for key, one in self.settings.items() if one != "auto" and not (own and key == "controller")}
+            )
 
     def load_task(self, home: Path | None = None) -> Task:
         """Return the world with start and goal.
@@ -265,10 +270,14 @@ class Written:
         from antdrive.worlds import list_worlds
 
         world = self.world if not isinstance(self.world, str) or self.world in list_worlds() else rename(self.world)
-        source, mark, name = self.planner.rpartition(":")
-        planner = f"{rename(source)}{mark}{name}" if source.endswith(".py") else self.planner
+
+        def code(name: str) -> str:
+            source, mark, word = name.rpartition(":")
+            return f"{rename(source)}{mark}{word}" if source.endswith(".py") else name
+
         robot = self.robot if self.robot in list_robots() else rename(self.robot)
-        return dataclasses.replace(self, world=world, planner=planner, robot=robot)
+        settings = with_controller(self.settings, code)
+        return dataclasses.replace(self, world=world, planner=code(self.planner), robot=robot, settings=settings)
 
     def seen_from_here(self, home: Path, *, anywhere: bool = False) -> Written:
         """Return the same with files relative to the working directory, and modules beside the home as files.
@@ -282,12 +291,30 @@ class Written:
             path, here = (home / name).resolve(), Path.cwd()
             return str(path if anywhere or not path.is_relative_to(here) else path.relative_to(here))
 
-        source, _, name = self.planner.rpartition(":")
-        beside = home / f"{source}.py"
-        moving = anywhere or home.resolve() != Path.cwd()
-        if source and moving and not source.endswith(".py") and beside.is_file():
-            return dataclasses.replace(self, planner=f"{beside.name}:{name}").moved(shown)
-        return self.moved(shown)
+        def code(name: str) -> str:
+            source, _, word = name.rpartition(":")
+            beside = home / f"{source}.py"
+            moving = anywhere or home.resolve() != Path.cwd()
+            is_module = source and moving and not source.endswith(".py") and beside.is_file()
+            return f"{beside.name}:{word}" if is_module else name
+
+        settings = with_controller(self.settings, code)
+        return dataclasses.replace(self, planner=code(self.planner), settings=settings).moved(shown)
+
+
+def with_controller(settings: Mapping[str, Any], rename: Callable[[str], str]) -> Mapping[str, Any]:
+    """Return settings as files write them, with another name of the controller.
+
+    Args:
+        settings: the settings by key
+        rename: returns the other name
+    """
+    value = settings.get("controller")
+    if isinstance(value, str):
+        return {**settings, "controller": rename(value)}
+    if isinstance(value, dict) and isinstance(value.get("name"), str):
+        return {**settings, "controller": {**value, "name": rename(value["name"])}}
+    return settings
 
 
 def named_task(task: Task, _: str) -> dict[str, Any]:

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError, InputError
-from antdrive.planners import PlannerError
 from antdrive.runs.pool import Pool, WorkerDied, in_new_process
 from antdrive.runs.suites.baseline import Baseline, fixed_hashes
 from antdrive.runs.suites.demands import Demands
@@ -171,7 +171,7 @@ class Criteria:
 
         return is_unsteady(s, first, elsewhere)
 
-    def raised(self, s: Scenario, error: PlannerError) -> CheckResult:
+    def raised(self, s: Scenario, error: ComponentError) -> CheckResult:
         """Return the result of a test whose planner raised an error, with what has changed since the baseline."""
         details: tuple[str, ...] = ()
         with suppress(InputError):
@@ -265,7 +265,7 @@ def evaluate_case(case: SuiteCase, *, update: Update = "", results: Results | No
     criteria = dataclasses.replace(criteria, commands=tuple(filter(None, (*criteria.commands, run_alone))))
     try:
         return criteria.evaluate(drive(scenario))
-    except PlannerError as error:
+    except ComponentError as error:
         return criteria.raised(scenario, error)
 
 

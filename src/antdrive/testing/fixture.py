@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError
-from antdrive.planners import PLANNERS, Planner, PlannerError, is_built_in
+from antdrive.planners import PLANNERS, Planner, is_built_in
 from antdrive.robots import RobotSpec, list_robots
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.nearest import first_contact, nearest_of
@@ -133,7 +134,7 @@ class DriveFixture:
         )
         try:
             run = drive_scenario(scenario)
-        except PlannerError as error:
+        except ComponentError as error:
             result = criteria.raised(scenario, error)
             self._report(result)
             raise DriveFailure(result) from error

@@ -130,3 +130,30 @@ def test_a_second_comparison_in_the_same_folder_is_told(refused, small):
         other.communicate(b"\n")
     assert "is writing to this folder" in says
     assert "is writing to this folder" in planning
+
+
+def test_controllers_are_compared_with_one_planner(antdrive, small):
+    words = (
+        "compare",
+        small,
+        "-p",
+        "astar",
+        "--controller",
+        "stanley",
+        "--controller",
+        "wide=dwa",
+        "--no-figures",
+        "--json",
+    )
+    code, out, _ = antdrive(*words, "--set", "wide.reach=1.5", "--out", "c")
+    runs = json.loads(out)["runs"]
+    assert code == 0
+    assert {name: run["settings"]["controller"] for name, run in runs.items()} == {
+        "stanley": "stanley",
+        "wide": {"name": "dwa", "reach": 1.5},
+    }
+
+
+def test_controllers_are_compared_with_no_other_number_of_planners(refused, small):
+    said = refused("compare", small, "-p", "astar", "-p", "sipp", "--controller", "dwa", "--controller", "coulter")
+    assert "--planner: give one, with which several controllers are compared" in said

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antdrive.planners.user_code import LOADED
+from antdrive.base.user_code import LOADED
 
 
 def test_a_drive_becomes_tables(small_run, antdrive):

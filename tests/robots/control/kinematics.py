@@ -16,7 +16,7 @@ def avoiding(tracked, robot, avoidance, movers, radius, *, start, speed=0.0, arc
     last = Twist(speed, 0.0)
     for k in range(round(seconds * hz)):
         here, (places, velocity) = tuple(pose), movers(k)
-        wanted, after = PurePursuit().step(tracked, here, last, pursuit)
+        wanted, after = PurePursuit().pursue(tracked, here, last, pursuit)
         last, avoids, state = avoidance.avoid(
             tracked,
             robot,

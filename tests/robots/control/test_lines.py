@@ -83,7 +83,7 @@ def test_the_robot_is_slow_beside_obstacles_and_stops_before_one_on_its_line():
     controller, pose, command, state = PurePursuit(), (2.0, 0.0, 0.0), Twist(1.0, 0.0), PursuitState(2.0)
     tracked = controller.prepare(route, across, robot, 0.03, DT)
     while pose[0] < 2.49 and command.speed > controller.creep_speed:
-        command, state = controller.step(tracked, pose, command, state)
+        command, state = controller.pursue(tracked, pose, command, state)
         pose = (pose[0] + command.speed * DT, 0.0, 0.0)
     assert command.speed <= controller.creep_speed
     assert LIMITERS[state.limiter] == "braking"
@@ -100,7 +100,7 @@ def test_variants_of_the_path_still_arrive(variant):
     tracked = getattr(controller.prepare(route, OPEN, robot, 0.03, DT), variant)
     pose, command, state = (0.0, 0.0, 0.0), Twist(0.0, 0.0), PursuitState()
     for _ in range(1200):
-        command, state = controller.step(tracked, pose, command, state._replace(turning=False))
+        command, state = controller.pursue(tracked, pose, command, state._replace(turning=False))
         x, y, yaw = pose
         pose = (
             x + command.speed * math.cos(yaw) * DT,
@@ -132,7 +132,7 @@ def test_avoidance_stops_the_robot_for_a_mover_on_its_line():
     controller = PurePursuit()
     tracked = controller.prepare(route, OPEN, robot, 0.03, DT)
     before, last = PursuitState(2.0), Twist(1.0, 0.0)
-    wanted, _ = controller.step(tracked, (2.0, 0.0, 0.0), last, before)
+    wanted, _ = controller.pursue(tracked, (2.0, 0.0, 0.0), last, before)
     places = np.full((len(avoidance.prediction_times), 1, 2), (3.2, 0.0))
     met = avoidance.avoid(
         tracked, robot, (2.0, 0.0, 0.0), last, before, wanted, AvoidanceState(), places, np.array([0.2])

@@ -26,7 +26,7 @@ def driven(robot, pose, movers, margin=5 * KEPT):
     tracked = controller.prepare(ROUTE, WORLD, robot, margin, PERIOD)  # the controller stops at a fifth of its margin
     twist, before, state, poses = Twist(0.0, 0.0), PursuitState(arc=4.0 + pose[0]), AvoidanceState(), [pose]
     for k in range(PERIODS):
-        wanted, after = controller.step(tracked, pose, twist, before)
+        wanted, after = controller.pursue(tracked, pose, twist, before)
         times = k * PERIOD + avoidance.prediction_times
         places = movers[:, :2] + times[:, None, None] * movers[:, 2:4]
         twist, avoids, state = avoidance.avoid(

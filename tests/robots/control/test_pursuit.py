@@ -25,7 +25,7 @@ def follow(robot, route, pose, world=OPEN, margin=0.05):
     command, state = Twist(0.0, 0.0), PursuitState()
     poses, commands, states = [pose], [command], [state]
     for _ in range(60 * 120):
-        command, state = controller.step(tracked, pose, command, state)
+        command, state = controller.pursue(tracked, pose, command, state)
         x, y, yaw = pose
         middle = yaw + command.yaw_rate * DT / 2
         pose = (
@@ -97,7 +97,7 @@ def test_a_robot_far_from_its_route_does_not_creep_back_to_a_corner(side, turtle
     pose, command, state = (2.05, 0.8 * side, -math.pi / 2 * side), Twist(0.0, 0.0), PursuitState(arc=1.95)
     fastest = 0.0
     for period in range(60 * 4):
-        command, state = controller.step(tracked, pose, command, state)
+        command, state = controller.pursue(tracked, pose, command, state)
         pose = (
             pose[0] + command.speed * math.cos(pose[2]) * DT,
             pose[1] + command.speed * math.sin(pose[2]) * DT,
@@ -160,7 +160,7 @@ def test_a_standing_robot_turns_to_the_route_first_and_a_moving_one_does_not_sto
     assert np.abs(poses[:, 1]).max() < 0.02  # otherwise it would leave the route
     controller = PurePursuit()
     tracked = controller.prepare(straight, OPEN, jackal, 0.05, DT)
-    _, state = controller.step(tracked, (1.0, 0.0, 0.5), Twist(1.0, 0.0), PursuitState(1.0))
+    _, state = controller.pursue(tracked, (1.0, 0.0, 0.5), Twist(1.0, 0.0), PursuitState(1.0))
     assert not state.turning
 
 
@@ -250,8 +250,8 @@ def test_skipped_discs_change_no_clearance(seed):
 def test_driving_backwards_mirrors_driving_forwards(turtlebot):
     controller = PurePursuit()
     tracked = controller.prepare(STAIRCASE, OPEN, turtlebot, 0.05, DT)
-    ahead, _ = controller.step(tracked, (0.2, 0.1, 0.4), Twist(0.1, 0.2), PursuitState())
+    ahead, _ = controller.pursue(tracked, (0.2, 0.1, 0.4), Twist(0.1, 0.2), PursuitState())
     backwards = replace(tracked, backwards=True)
-    behind, _ = controller.step(backwards, (0.2, 0.1, 0.4 - math.pi), Twist(-0.1, 0.2), PursuitState())
+    behind, _ = controller.pursue(backwards, (0.2, 0.1, 0.4 - math.pi), Twist(-0.1, 0.2), PursuitState())
     assert behind == pytest.approx(Twist(-ahead.speed, ahead.yaw_rate))
     assert ahead.speed > 0.05

@@ -196,8 +196,11 @@ def test_the_name_of_a_class_is_found_too():
 @pytest.mark.parametrize(
     ("controller", "says"),
     [
-        (ComponentRecord(name="Mine", settings={}), "record.controller.name: 'Mine' cannot be rebuilt"),
-        (ComponentRecord(name="PurePursuit", settings={"speed": 1.0}), "record.controller.speed: unknown"),
+        (ComponentRecord(name="Mine", settings={}), "record.controller.name: 'Mine' is not registered"),
+        (
+            ComponentRecord(name="PurePursuit", settings={"speed": 1.0}),
+            "record.controller.speed: no option of pure-pursuit is called 'speed'",
+        ),
     ],
     ids=lambda value: value.name if isinstance(value, ComponentRecord) else "",
 )

@@ -11,8 +11,8 @@ import pytest
 
 from antdrive import Disc, Outcome, Scenario
 from antdrive.base.errors import InputError
+from antdrive.base.user_code import is_importable_elsewhere
 from antdrive.cli.commands.run import run as command
-from antdrive.planners.user_code import is_importable_elsewhere
 from antdrive.runs.margins.choice import Calibration
 from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.suites import Baseline, load_suite, scenario_of, select
@@ -274,7 +274,11 @@ def test_words_select_tests(tmp_path):
     for words, pattern, message in (
         ([f"{path}::d"], None, "no test 'd'; choose from"),
         ([str(path)], "x*", "no test of"),
-        ([str(wrong)], None, "scenarios.a.controller.brake: unknown setting; did you mean braking"),
+        (
+            [str(wrong)],
+            None,
+            "scenarios.a.controller.brake: no option of pure-pursuit is called 'brake'; did you mean braking",
+        ),
         ([str(tmp_path / "none.drive.yaml")], None, "no such file"),
         ([__file__], None, "not a suite; its name must end in .drive.yaml"),
         ([str(Path(__file__).parent)], None, "contains no suites"),

@@ -141,7 +141,7 @@ def turning_room(robot, side):
     tracked = guide._prepare(route, world, side)
     command, state = Twist(0.0, 0.0), PursuitState()
     for _ in range(5):
-        command, state = guide._routes.controller.step(tracked, (3.0, 2.0, 0.0), command, state)
+        command, state = guide._routes.controller.pursue(tracked, (3.0, 2.0, 0.0), command, state)
     return command.yaw_rate
 
 

@@ -55,7 +55,7 @@ def test_room_for_a_turn_and_discs_are_not_narrow(cart, turtlebot):
 
 
 def test_the_rehearsal_and_physics_agree(cart, monkeypatch):
-    rng, refused, left, step = np.random.default_rng(5), 0, 0, PurePursuit.step
+    rng, refused, left, step = np.random.default_rng(5), 0, 0, PurePursuit.pursue
     for _ in range(40):
         yaw, side, gap, along = rng.uniform((-0.7, -1, 0.01, -0.4), (0.7, 1, 0.25, 0.4))
         across = math.copysign(0.3 + gap + 0.3, side)
@@ -67,7 +67,9 @@ def test_the_rehearsal_and_physics_agree(cart, monkeypatch):
         planned = plan(s)
         with monkeypatch.context() as patch:
             patch.setattr("antdrive.sim.driving.routes.cannot_leave", lambda *_: "")
-            patch.setattr(PurePursuit, "step", lambda self, path, *now: step(self, path.ignoring_turn_clearance, *now))
+            patch.setattr(
+                PurePursuit, "pursue", lambda self, path, *now: step(self, path.ignoring_turn_clearance, *now)
+            )
             driven = run(s)
         said = "" if planned[1].solved else planned[1].reason
         assert ("would bring" in said) == (driven.outcome is Outcome.COLLIDED), (yaw, at, said, driven.outcome)
@@ -130,6 +132,6 @@ def test_the_first_motion_is_rehearsed_for_a_minute(turtlebot):
 
     cart = replace(turtlebot, footprint=Footprint.rectangle(0.6, 0.8))
     world = World("w", (0.0, 0.0, 6.0, 4.0))
-    stays = SimpleNamespace(step=step)
+    stays = SimpleNamespace(pursue=step)
     assert cannot_leave(driver(turtlebot).way.path, stays, world, cart, (0.45, 2.0, 0.0), 2) == ""
     assert len(steps) == 2 * 60

@@ -42,7 +42,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "init": Command("Write a suite, a robot, a world, a Python test and a GitHub workflow that pass."),
         "run": Command("Plan a path, drive it in physics and certify the drive.", "plans drives"),
         "plan": Command("Plan a path without driving it.", "plans"),
-        "compare": Command("Compare planners on worlds or from campaign results.", "plans"),
+        "compare": Command("Compare planners, or controllers, on worlds or from campaign results.", "plans"),
         "sweep": Command("Run a campaign: every combination of its settings.", "resumes plans"),
         "barn": Command("Drive the BARN Challenge worlds, or score a log.", "resumes plans"),
         "render": Command("Render films of logged drives from any camera."),
@@ -59,7 +59,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "shrink": Command("Reduce a failure to a minimal reproducer.", "resumes plans drives"),
         "reproduce": Command("Repeat a paper's experiments and test its claims.", "resumes plans"),
         "planners": Command("List the planners, or describe some with their options."),
-        "controller": Command("List the options of the controller with default, unit and meaning."),
+        "controller": Command("List the options of pure pursuit, or describe controllers with theirs."),
         "schema": Command("Print the JSON Schema of a file type."),
         "warm": Command("Compile all planners ahead of time."),
     }

@@ -19,13 +19,13 @@ from antdrive.cli.exits import FAILED, SUCCEEDED
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives, print_faults, print_idle_settings, results_folder
 from antdrive.cli.scenario_options import Ends
-from antdrive.runs.comparing import PLANNER_FAULT, compare_scenarios
+from antdrive.runs.comparing import FAULTS, compare_scenarios
 from antdrive.runs.results_folder import mark_of
 from antdrive.sim.settings import COMPARED_SMOOTHING
 from antdrive.views.run_folder import check_film, check_folder, write_run
 
 if TYPE_CHECKING:
-    from antdrive.planners import PlannerError
+    from antdrive.base.components import ComponentError
     from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
@@ -52,6 +52,10 @@ def compare(
             "-s",
         ),
     ] = None,
+    controller: Annotated[
+        list[str] | None,
+        option("NAME", "Controller; several are compared with one planner, or LABEL=NAME.  [default: pure-pursuit]"),
+    ] = None,
     robot: options.Robot = "turtlebot",
     seeds: Annotated[int, option("NUMBER", "Seeds per world, starting at --seed.", min=1, max=10_000)] = 1,
     ends: Ends,
@@ -64,13 +68,13 @@ def compare(
     json: options.Json = False,
     **given: Any,
 ) -> int:
-    """Compare planners on worlds or from campaign results.
+    """Compare planners, or controllers, on worlds or from campaign results.
 
     Worlds: pairs the planners by world and seed; planners drive their own plans, unless --smoothing is given. Figures and film
     show the first pair. Exit code 0: every run succeeded.
     Campaign folders of `antdrive sweep`: prints success rates with intervals, outcomes, and a test of every pair.
     """
-    from antdrive.planners import PlannerError
+    from antdrive.base.components import ComponentError
     from antdrive.sim.pipeline import run
     from antdrive.sim.written import Written
 
@@ -80,8 +84,11 @@ def compare(
     require_physics()
     check_worlds(worlds)
     places = [ends.of(world) for world in worlds]
-    entrants = entrants_of(planner, settings, robot)
-    scenarios = {label: [setup.scenario(place, given) for place in places] for label, setup in entrants.items()}
+    entrants = entrants_of(planner, settings, robot, controller)
+    scenarios = {
+        label: [one.setup.scenario(place, given | one.controller) for place in places]
+        for label, one in entrants.items()
+    }
     every = [scenario for several in scenarios.values() for scenario in several]
     names = list(dict.fromkeys(scenario.task.world.name for scenario in every))
     if len(names) < len(worlds):
@@ -94,19 +101,19 @@ def compare(
     usual = Path("out") / file_name(f"compare-{'-'.join(names)}"[:100])
     with results_folder(out, usual, MARKER, mark, write_manifest=False) as (folder, facts):
 
-        def attempt(label: str, scenario: "Scenario") -> "tuple[Run | PlannerError, str | None]":
+        def attempt(label: str, scenario: "Scenario") -> "tuple[Run | ComponentError, str | None]":
             """Drive with a progress bar, and write the run."""
             case = scenario.task.world.name, scenario.seed
             part = (folder if len(cases) == 1 else folder / file_name("{}-{}".format(*case))) / label
             check_folder(part)
-            result: Run | PlannerError
+            result: Run | ComponentError
             with planning(f"{case[0]}, seed {case[1]}: {label}"):
                 try:
                     result = run(scenario)
-                except PlannerError as error:
+                except ComponentError as error:
                     result = error
             write_json(folder / MARKER, facts)  # early, so that an interrupted comparison owns its results
-            if isinstance(result, PlannerError):
+            if isinstance(result, ComponentError):
                 print_traceback(result)
                 return result, None
             command = Written.of(scenario).command() or ""
@@ -121,7 +128,7 @@ def compare(
         files |= _views(compared.logs, folder, film, figures, speed=speed, prelude=prelude)
     results = {"runs": {run.label: run.facts for run in first}, **compared.as_dict(), "files": files}
     show(json, results, [*compared.lines(), *file_lines(files)])
-    errors = Counter(run.facts["reason"] for run in compared.runs if run.facts["outcome"] == PLANNER_FAULT)
+    errors = Counter(run.facts["reason"] for run in compared.runs if run.facts["outcome"] in FAULTS)
     code = print_faults(dict(errors.most_common()))
     if len(compared.logs) < 2:
         planned = "only one planner" if compared.logs else "no planner"

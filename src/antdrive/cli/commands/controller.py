@@ -4,20 +4,31 @@ from typing import Annotated
 
 from antdrive.base.tables import table
 from antdrive.cli import options
+from antdrive.cli.commands.planners import details
 from antdrive.cli.console import show
-from antdrive.cli.options import flag
+from antdrive.cli.options import argument, flag
 
 
 def controller(
+    names: Annotated[
+        list[str] | None, argument("NAME", "Controllers to describe with their options: names or FILE.py:CLASS.")
+    ] = None,
     nav2: Annotated[bool, flag("List Nav2's parameters and their counterparts instead.", "--nav2")] = False,
     json: options.Json = False,
 ) -> None:
-    """List the options of the controller with default, unit and meaning."""
+    """List the options of pure pursuit, or describe controllers with theirs."""
+    from antdrive.base.registry import describe, options_card
+    from antdrive.robots import load_controller
     from antdrive.robots.control.nav2 import NAV2
     from antdrive.robots.control.pursuit import controller_options
 
     if nav2:
         show(json, dict(NAV2), table(("Nav2's Regulated Pure Pursuit", "antdrive"), NAV2.items()))
+        return
+    if names:
+        made = {name: load_controller(name) for name in names}
+        described = {name: {"about": describe(one), **options_card(one)} for name, one in made.items()}
+        show(json, described, details(described))
         return
     known = controller_options()
     facts = {

@@ -22,7 +22,7 @@ def planners(
 
     known = {name: load_planner(name) for name in names} if names else list_planners()
     facts = {name: facts_of(planner) for name, planner in known.items()}
-    show(json, facts, _details(facts) if names else planner_lines(_rows(facts)))
+    show(json, facts, details(facts) if names else planner_lines(_rows(facts)))
 
 
 def planner_rows() -> Iterator[Row]:
@@ -37,9 +37,11 @@ def _rows(facts: Mapping[str, Any]) -> Iterator[Row]:
     return ((name, one["about"], one["plans_for"]) for name, one in facts.items())
 
 
-def _details(facts: Mapping[str, Any]) -> Iterator[str]:
+def details(facts: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the summary and the options of planners or controllers, by name."""
     for name, one in facts.items():
         yield f"{name}: {one['about']}"
-        yield f"  plans for: {one['plans_for']}"
+        if "plans_for" in one:
+            yield f"  plans for: {one['plans_for']}"
         rows = [(key, str(value), one["meanings"].get(key, "")) for key, value in one["options"].items()]
         yield from table(("option", "default", "meaning"), rows) if rows else ("  no options",)

@@ -21,6 +21,9 @@ def verify(
     planner: Annotated[
         str | None, option("FILE.py:CLASS", "Class of the logs' planner, if not registered; with --replay.")
     ] = None,
+    controller: Annotated[
+        str | None, option("FILE.py:CLASS", "Class of the logs' controller, if not registered; with --replay.")
+    ] = None,
     json: options.Json = False,
 ) -> bool | int:
     """Re-certify drives from their logs alone.
@@ -33,8 +36,9 @@ def verify(
     from antdrive.sim.verifying import verify_log
     from antdrive.worlds.files.world_file import load_task
 
-    if planner is not None and not replay:
-        raise InputError("--planner: only the replay plans; add --replay")
+    for option_of, given_class, does in (("--planner", planner, "plans"), ("--controller", controller, "drives")):
+        if given_class is not None and not replay:
+            raise InputError(f"{option_of}: only the replay {does}; add --replay")
     if replay:
         require_physics()
     task = None if world is None else load_task(world)
@@ -46,9 +50,16 @@ def verify(
         try:
             path = str(log_at(given))
             result = given / "result.json" if given.is_dir() else None
-            elsewhere = functools.partial(_fingerprint_elsewhere, Path(path), planner)
+            elsewhere = functools.partial(_fingerprint_elsewhere, Path(path), planner, controller)
             report = checked[path] = verify_log(
-                Path(path), task, spec, result, replay=replay, planner=planner, elsewhere=elsewhere
+                Path(path),
+                task,
+                spec,
+                result,
+                replay=replay,
+                planner=planner,
+                controller=controller,
+                elsewhere=elsewhere,
             )
         except InputError as error:
             print_error(str(error))
@@ -67,9 +78,9 @@ def verify(
     return all_certified if readable else INVALID_INPUT
 
 
-def _fingerprint_elsewhere(log: Path, planner: str | None) -> str | None:
+def _fingerprint_elsewhere(log: Path, planner: str | None, controller: str | None) -> str | None:
     """Return the fingerprint of a log's drive in a new process; None if that is unknown."""
     from antdrive.runs.pool import in_new_process
     from antdrive.sim.rerun import rerun_fingerprint
 
-    return in_new_process(functools.partial(rerun_fingerprint, log, planner))
+    return in_new_process(functools.partial(rerun_fingerprint, log, planner, controller))

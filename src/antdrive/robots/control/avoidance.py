@@ -39,7 +39,8 @@ from antdrive.base.errors import require
 from antdrive.robots.clearance import outline_of
 from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.robots.control._kernels_pursuit import PursuitTuning, reachable_twist
-from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
+from antdrive.robots.control.observation import Twist
+from antdrive.robots.control.pursuit import PursuitState, TrackedPath
 from antdrive.robots.spec import Footprint, RobotSpec
 
 SPEED_WEIGHT = 0.3  # value of final speed along the route, in metres of progress [m per m/s]

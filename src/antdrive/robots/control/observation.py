@@ -1,4 +1,4 @@
-"""Observations of a robot, and its briefing before a drive. Nothing here holds what is true."""
+"""Observations, briefings and commands of a robot. Nothing here holds what is true."""
 
 from __future__ import annotations
 
@@ -10,13 +10,24 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Point, Pose
-from antdrive.robots.control.pursuit import Twist
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import World
 
 
+class Twist(NamedTuple):
+    """A velocity of the robot.
+
+    Attributes:
+        speed: forward speed [m/s]
+        yaw_rate: counter-clockwise yaw rate [rad/s]
+    """
+
+    speed: float
+    yaw_rate: float
+
+
 class Movers(NamedTuple):
-    """Movers that a robot is given in a control period."""
+    """Movers that a robot perceives in a control period."""
 
     numbers: npt.NDArray[np.int64]  # (P,)
     positions: Floats  # (P, 2) [m]
@@ -42,9 +53,10 @@ class Observation(NamedTuple):
         t: time since the start [s]
         pose: estimated pose
         pending: the commands that have not reached the motors yet, oldest first
-        twist: measured speed and yaw rate
+        twist: measured velocity
+        command: the last command
         scan: ranges of a scan (beams,) [m]; None if none was due
-        movers: movers that it is given
+        movers: perceived movers
     """
 
     tick: int
@@ -52,6 +64,7 @@ class Observation(NamedTuple):
     pose: Pose
     pending: tuple[Twist, ...]
     twist: Twist
+    command: Twist = Twist(0.0, 0.0)
     scan: Floats | None = None
     movers: Movers = NOBODY
 
@@ -83,3 +96,16 @@ class Briefing:
     matching: bool = False
     movers: int = 0
     motions: Callable[[Floats], Floats] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerCapabilities:
+    """Capabilities of a controller.
+
+    Attributes:
+        turns: follows routes of lines with turns on the spot (`Route.turns`), which plans for footprints need
+        avoids_movers: keeps clear of movers itself; for other controllers local avoidance changes the commands
+    """
+
+    turns: bool = False
+    avoids_movers: bool = False

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Interval
 
-from antdrive.base import Bounds, Floats, Pose
+from antdrive.base import Bounds, Floats, Point, Pose
 from antdrive.base.caches import Keyed, cached
 from antdrive.base.errors import FieldError, require
 from antdrive.base.records import clamp_angle, meanings_of, require_ranges, unchecked_copy
@@ -28,12 +28,14 @@ from antdrive.robots.control import _kernels_lines, _kernels_obstacles, _kernels
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
+from antdrive.robots.control.observation import Briefing, ControllerCapabilities, Observation, Twist
 from antdrive.robots.control.speed_limits import heading_error, limits_along, limits_along_lines, steady, steering_time
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Route, World
 from antdrive.worlds.world import by_geometry
 
 SPACING = 0.02  # distance between the samples along a route [m]
+ROUNDING = 1e-9  # a point this close to a corner is beyond it [m]
 SQUARE = 0.5  # minimum side of a square of the obstacle index [m]
 SIDE = 1  # place of the side of an index of obstacles among the numbers of a packed path
 EVERYTHING = 1e6  # side of the single square that holds all obstacles [m]
@@ -65,18 +67,6 @@ class ActsOn:
 
 
 CORNERS, SMOOTH = ActsOn(corners=True), ActsOn(corners=False)
-
-
-class Twist(NamedTuple):
-    """A velocity of the robot.
-
-    Attributes:
-        speed: forward speed [m/s]
-        yaw_rate: counter-clockwise yaw rate [rad/s]
-    """
-
-    speed: float
-    yaw_rate: float
 
 
 class PursuitState(NamedTuple):
@@ -133,6 +123,47 @@ class TrackedPath:
         numbers = np.array([backwards, side, *self.limits, *tuning.values()])
         return *samples, *obstacles, corners, numbers
 
+    def nearest(self, pose: Pose, arc: float = 0.0, window: float = 1.0) -> float:
+        """Return the arc length of the point nearest to a pose, from `arc` to `window` beyond it [m]."""
+        return float(_kernels_path.project(pose[0], pose[1], arc, window, self.samples.xy, self.samples.arc)[0])
+
+    def pose_at(self, arc: float) -> Pose:
+        """Return the point of the route at an arc length [m], and the route's heading from there on [m, m, rad]."""
+        xy, at = self.samples.xy, self.samples.arc
+        k = _kernels_path.segment_at(arc + ROUNDING, at)
+        x, y, _ = _kernels_path.point_at(arc, k, xy, at)
+        return x, y, math.atan2(xy[k + 1, 1] - xy[k, 1], xy[k + 1, 0] - xy[k, 0])
+
+    def carrot(self, pose: Pose, arc: float, lookahead: float) -> Point:
+        """Return the first point beyond an arc length [m] at distance `lookahead` [m] from a pose; past the end, on its line."""
+        xy, at = self.samples.xy, self.samples.arc
+        x, y = _kernels_path.carrot_at(pose[0], pose[1], lookahead, arc, _kernels_path.segment_at(arc, at), xy, at)
+        return x, y
+
+    def speed_limit(self, arc: float, curvature: float = 0.0) -> float:
+        """Return the highest speed [m/s] at an arc length [m] on a motion of a curvature [1/m]; 0 at the goal.
+
+        It is the limit of pure pursuit: by the robot, by bends and obstacles of the route, and to stop at its end.
+        """
+        limits, tuning, remaining = self.limits, self.tuning, self.length - arc
+        if remaining <= self.goal_distance:
+            return 0.0
+        i = min(int(arc / tuning.spacing), len(self.samples.speed) - 2)
+        limit = min(
+            limits.speed,
+            *self.samples.speed[i : i + 2].tolist(),
+            _kernels_pursuit.slow_for_curvature(curvature, limits.lateral_acceleration, limits.yaw_rate),
+            _kernels_pursuit.brake_for_goal(remaining - self.goal_distance / 2, tuning.braking * limits.acceleration),
+        )
+        return float(max(limit, min(tuning.creep_speed, limits.speed)))
+
+    def discs_near(self, pose: Pose, reach: float) -> Floats:
+        """Return x, y and radius of the known obstacles of the square around a pose (D, 3) [m]: all within `reach` if indexed."""
+        square = _kernels_obstacles.square_at(pose[0], pose[1], self.obstacles)
+        first, last = self.obstacles.starts[square : square + 2].tolist()
+        discs: Floats = self.obstacles.discs[first:last]
+        return discs[np.hypot(discs[:, 0] - pose[0], discs[:, 1] - pose[1]) - discs[:, 2] <= reach]
+
     def with_obstacles(self, obstacles: ObstacleIndex) -> TrackedPath:
         """Return the path with an index of other `obstacles`."""
         *samples, _, _, _, _, corners, numbers = self.packed
@@ -153,7 +184,10 @@ class TrackedPath:
 
 @dataclass(frozen=True, kw_only=True)
 class PurePursuit:
-    """Settings of a pure-pursuit controller.
+    """Pure pursuit whose lookahead keeps clear of obstacles; routes for footprints are lines and turns on the spot.
+
+    Known weaknesses: it follows the route and does not leave it for an obstacle that no plan knows; where no arc is clear it
+    creeps or stops.
 
     Attributes:
         lookahead_time: lookahead divided by speed; the speed is at most the clear lookahead divided by this [s]
@@ -255,7 +289,22 @@ class PurePursuit:
         )
         return TrackedPath(route, tuning.goal_distance, samples, obstacles, limits, tuning)
 
-    def step(self, tracked: TrackedPath, pose: Pose, command: Twist, state: PursuitState) -> tuple[Twist, PursuitState]:
+    @property
+    def capabilities(self) -> ControllerCapabilities:
+        """Capabilities of this controller."""
+        return ControllerCapabilities(turns=True)
+
+    def start(self, briefing: Briefing, path: TrackedPath) -> PursuitState:
+        """Return the state for a new path, whatever the `briefing`."""
+        return PursuitState()
+
+    def step(self, now: Observation, path: TrackedPath, state: PursuitState) -> tuple[Twist, PursuitState]:
+        """Return the command for what the robot knows `now`, and the state for the next period."""
+        return self.pursue(path, now.pose, now.command, state)
+
+    def pursue(
+        self, tracked: TrackedPath, pose: Pose, command: Twist, state: PursuitState
+    ) -> tuple[Twist, PursuitState]:
         """Return the next command and the state for the next period.
 
         Args:
@@ -266,7 +315,7 @@ class PurePursuit:
         """
         if tracked.backwards:  # backwards is forwards with the heading turned by pi
             reversed_ = (pose[0], pose[1], pose[2] + math.pi), Twist(-command.speed, command.yaw_rate)
-            ahead, after = self.step(replace(tracked, backwards=False), *reversed_, state)
+            ahead, after = self.pursue(replace(tracked, backwards=False), *reversed_, state)
             return Twist(-ahead.speed, ahead.yaw_rate), after
         # Each kind of route has a kernel of its own, so that a drive compiles one.
         lines = len(tracked.samples.turns)

@@ -131,9 +131,6 @@ def _settings_schema() -> dict[str, Any]:
     schema = dict(schema_of(SettingsEntry))
     discs = {"type": "array", "items": schema.pop("$defs")["Disc"]}
     keys = {key: discs if key == "unseen" else one for key, one in schema["properties"].items()}
-    number = keys["controller"]["additionalProperties"]
-    several_numbers = {"anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}
-    keys["controller"] = {**keys["controller"], "additionalProperties": several_numbers}
     about = {key: one["description"] for key, one in schema["properties"].items()}
     several = {
         key: {"description": about[key], "anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}

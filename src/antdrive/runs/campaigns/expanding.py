@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -22,7 +23,7 @@ from antdrive.sim.forms import scenario_fields
 from antdrive.sim.idle_settings import idle_notes
 from antdrive.sim.log.record import canonical_hash
 from antdrive.sim.scenario import Scenario, key_of
-from antdrive.sim.written import Written, placed, unchosen
+from antdrive.sim.written import Written, placed, unchosen, with_controller
 from antdrive.worlds import Task
 from antdrive.worlds.formats.map_server import OF_SHADE
 
@@ -161,10 +162,17 @@ def _settings(campaign: Campaign) -> list[tuple[dict[str, Any], Location]]:
     combinations = []
     for *values, (settings, place) in itertools.product(*map(campaign.values, AXES), listed):
         given = {**settings, **dict(zip(keys, values, strict=True))}
+        given = dict(with_controller(given, functools.partial(_located, campaign.folder)))
         with placed(campaign.at(*place)):
             scenario_fields(given)
         combinations.append((given, place))
     return combinations
+
+
+def _located(folder: Path, name: str) -> str:
+    """Return the name of a component with the whole path of a user's file, relative to a folder."""
+    file, mark, word = name.rpartition(":")
+    return f"{(folder / file).absolute()}{mark}{word}" if file.endswith(".py") else name
 
 
 #: Locations in a campaign of a scenario's fields, where the names differ.

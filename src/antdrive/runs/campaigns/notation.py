@@ -8,7 +8,7 @@ from typing import Any
 
 from antdrive.base.checks import grouped
 from antdrive.base.errors import InputError
-from antdrive.planners.user_code import record_name
+from antdrive.base.user_code import record_name
 from antdrive.robots import list_robots
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.sim.settings import SETTINGS

@@ -17,8 +17,8 @@ from antdrive.base.checks import show, suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import relative
+from antdrive.base.user_code import label_names
 from antdrive.planners import PLANNERS, Query, capabilities_of, load_planner, planner_version
-from antdrive.planners.user_code import label_names
 from antdrive.robots import PurePursuit, RobotSpec, outline_of, overlap_at
 from antdrive.robots.default_margin import LEAST, default_margin
 from antdrive.runs.campaigns.campaign import Campaign, RandomTasks, seeds_of

@@ -16,7 +16,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import open_regular, relative
 from antdrive.base.optional import parquet_library
 from antdrive.base.tables import table
-from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, PLANNER_FAULT
+from antdrive.runs.campaigns.rows import CRASHED, FAULTS, NOT_CANONICAL
 from antdrive.runs.campaigns.store import GRID_FILE, TABLE, joined, read_manifest, read_table
 from antdrive.runs.statistics.run_table import FOLDER, RunTable, column_named, matching, merged
 
@@ -70,7 +70,7 @@ class SweepResults:
     @property
     def faults(self) -> dict[str, int]:
         """The number of runs by error of a planner or of antdrive, the most frequent first."""
-        prefix = {PLANNER_FAULT: "", CRASHED: "internal error: "}
+        prefix = {**dict.fromkeys(FAULTS, ""), CRASHED: "internal error: "}
         rows = zip(self.table["outcome"].to_pylist(), self.table["reason"].to_pylist(), strict=True)
         return dict(Counter(prefix[outcome] + reason for outcome, reason in rows if outcome in prefix).most_common())
 

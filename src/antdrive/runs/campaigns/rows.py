@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from antdrive.base.optional import parquet_library
 from antdrive.base.version import versions
 from antdrive.runs.campaigns.job import Job
-from antdrive.runs.comparing import PLANNER_FAULT as PLANNER_FAULT
+from antdrive.runs.comparing import FAULTS as FAULTS
 from antdrive.sim.facts import FACTS, IN_TABLE, facts_of
 from antdrive.sim.log.metrics import WALL_CLOCK
 from antdrive.sim.pipeline import Run

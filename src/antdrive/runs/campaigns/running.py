@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+from antdrive.base.components import ComponentError
 from antdrive.base.errors import InputError
 from antdrive.base.files import MAX_BYTES, read_bytes
-from antdrive.planners import PlannerError
 from antdrive.runs.campaigns.job import Job
-from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, failed_row, run_row, too_slow_row
+from antdrive.runs.campaigns.rows import CRASHED, failed_row, run_row, too_slow_row
 from antdrive.runs.pool import Done
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, run
@@ -47,8 +47,8 @@ class Driving:
             done = run(job.case.scenario(job.seed), progress=False)
         except InputError:
             raise
-        except PlannerError as error:
-            return Finished(failed_row(job.key, PLANNER_FAULT, str(error)))
+        except ComponentError as error:
+            return Finished(failed_row(job.key, error.outcome, str(error)))
         except Exception as error:
             return Finished(failed_row(job.key, CRASHED, f"{type(error).__name__}: {error}"))
         return self._kept(job, done)
@@ -85,5 +85,8 @@ def finished_of(done: Done[Job, Finished], limit: float | None) -> Finished:
     elif done.slow and limit is not None:
         row, log = too_slow_row(done.item.key, limit), None
     else:
-        row, log = failed_row(done.item.key, PLANNER_FAULT if done.fault else CRASHED, done.died), None
+        row, log = (
+            failed_row(done.item.key, f"{done.died.partition(' ')[0]}_fault" if done.fault else CRASHED, done.died),
+            None,
+        )
     return Finished({**row, "attempts": done.attempts}, log)

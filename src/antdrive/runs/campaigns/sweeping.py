@@ -22,7 +22,7 @@ from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campa
 from antdrive.runs.campaigns.expanding import Expansion, expand
 from antdrive.runs.campaigns.job import Job, SweepCase
 from antdrive.runs.campaigns.results import SweepResults
-from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, TOO_SLOW, grid_table
+from antdrive.runs.campaigns.rows import CRASHED, FAULTS, TOO_SLOW, grid_table
 from antdrive.runs.campaigns.running import Driving, Finished, Keep, Work, finished_of
 from antdrive.runs.campaigns.store import Store, former_grid, opened, read_manifest, results_in
 from antdrive.runs.margins.choice import Calibration, choose_margin
@@ -32,7 +32,7 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.written import unchosen
 from antdrive.worlds import save_task
 
-OUTCOMES = (*(one.key for one in Outcome), PLANNER_FAULT, CRASHED, TOO_SLOW)
+OUTCOMES = (*(one.key for one in Outcome), *FAULTS, CRASHED, TOO_SLOW)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,11 +10,12 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from antdrive.base.atomic import write_text
+from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import MAX_JSON_BYTES, parse_json, read_bytes
+from antdrive.base.user_code import is_importable_elsewhere
 from antdrive.base.version import versions
-from antdrive.planners import Planner, PlannerError
-from antdrive.planners.user_code import is_importable_elsewhere
+from antdrive.planners import Planner
 from antdrive.runs.failures.failure import Attempt, Failure, failure_of, failure_of_planner
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
@@ -38,7 +39,7 @@ def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = 
             return failure_of(run(scenario), bound)
         grid, answer = plan(scenario)
         return None if answer.solved else failure_of(Run(scenario, grid, answer), bound)
-    except PlannerError as error:
+    except ComponentError as error:
         return None if bound is not None else failure_of_planner(error)
     except (FieldError, InputError):  # such as a wanderer without a free cell in a smaller world
         return None

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from antdrive.base.checks import suggest
+from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.planners import PlannerError
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import CYLINDER, UNSEEN, WALL, Bound
 from antdrive.runs.suites.evaluation import RAISED, evaluate, limits, unmet_demands
@@ -173,14 +173,14 @@ class Attempt:
 
     scenario: Scenario
     run: Run | None
-    error: PlannerError | None = None
+    error: ComponentError | None = None
 
     @classmethod
     def of(cls, scenario: Scenario) -> Attempt:
         """Run a scenario."""
         try:
             return cls(scenario, run(scenario))
-        except PlannerError as error:
+        except ComponentError as error:
             return cls(scenario, None, error)
 
     @property
@@ -200,7 +200,7 @@ class Attempt:
         return failure_of_planner(self.error) if self.run is None else failure_of(self.run, bound)
 
 
-def failure_of_planner(error: PlannerError | None) -> Failure:
+def failure_of_planner(error: ComponentError | None) -> Failure:
     """Return the failure of a run that ended in an error of the planner."""
     return _with_reason(RAISED, NOTHING, str(error))
 

@@ -16,9 +16,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from antdrive.base import Floats
+from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
-from antdrive.planners import PlannerError
 from antdrive.robots import PursuitState, Twist, footprint_clearance
 from antdrive.robots.noise import moved_by
 from antdrive.runs.failures.failure import Attempt, Failure
@@ -115,7 +115,7 @@ def rehearsed_clearance(s: Scenario) -> float:
     """
     try:
         grid, answer = plan(s)
-    except PlannerError:
+    except ComponentError:
         return -math.inf
     if not answer.solved:
         return math.inf
@@ -131,7 +131,7 @@ def rehearsed_clearance(s: Scenario) -> float:
         state.arc > path.length - path.goal_distance and abs(plant.state.speed) < STANDING
     ):
         now = body.observe()
-        command, state = s.controller.step(path, moved_by(now.pose, now.pending, period), command, state)
+        command, state = s.pursuit.pursue(path, moved_by(now.pose, now.pending, period), command, state)
         body.step(command)
     return float(footprint_clearance(s.driven_world, s.robot.footprint, plant.poses).min())
 

@@ -20,9 +20,9 @@ from antdrive.base.files import parse_json, read_bytes
 from antdrive.base.plane import wrap_angle
 from antdrive.base.records import STRICT
 from antdrive.base.types import Floats
+from antdrive.base.user_code import module_hash
 from antdrive.base.version import versions
 from antdrive.planners import is_built_in
-from antdrive.planners.user_code import module_hash
 from antdrive.runs.suites.nearest import ClosestApproach, nearest_of
 from antdrive.runs.suites.suite import shown_path
 from antdrive.sim.facts import facts_of
@@ -39,7 +39,7 @@ SCHEMA = 1
 MAX_BYTES = 20_000  # of a baseline
 LINE_HZ = 10.0  # rate of the driven line, halved until the file is small enough [Hz]
 LEAST_HZ = 1e-3
-PLANNER_FILE = "planner file"  # hash of the file of a custom planner
+PLANNER_FILE, CONTROLLER_FILE = "planner file", "controller file"  # hashes of the files of custom ones
 
 
 def _to_outcome(value: Any) -> Outcome:
@@ -266,8 +266,14 @@ def fixed_hashes(s: Scenario) -> dict[str, str]:
         "world": canonical_hash(s.task),
         "robot": canonical_hash(s.robot),
         "unseen obstacles": hashlib.sha256(unseen.encode()).hexdigest(),
-        **({} if is_built_in(s.planner) else {PLANNER_FILE: module_hash(type(s.planner).__module__)}),
+        **{name: module_hash(module) for name, module in custom_modules(s).items()},
     }
+
+
+def custom_modules(s: Scenario) -> dict[str, str]:
+    """Return the modules of a scenario's custom planner and controller, by the names of their hashes."""
+    parts = {PLANNER_FILE: s.planner, CONTROLLER_FILE: s.controller}
+    return {name: type(part).__module__ for name, part in parts.items() if not is_built_in(part)}
 
 
 def _rounded(value: float | None) -> float | None:

@@ -15,10 +15,9 @@ import numpy as np
 
 from antdrive.base.plane import format_point
 from antdrive.base.types import Floats, Point
+from antdrive.base.user_code import module_file
 from antdrive.base.version import versions
-from antdrive.planners import is_built_in
-from antdrive.planners.user_code import module_file
-from antdrive.runs.suites.baseline import PLANNER_FILE, Baseline, configuration_hashes
+from antdrive.runs.suites.baseline import Baseline, configuration_hashes, custom_modules
 from antdrive.runs.suites.demands import END, Bound, Demands
 from antdrive.runs.suites.nearest import cause_of_contact, first_contact, first_contact_kind, nearest_of
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
@@ -137,7 +136,7 @@ def _causes(run: Run, baseline: Baseline, elsewhere: Callable[[], str | None]) -
     s, hashes = run.scenario, configuration_hashes(run)
     same_drive = baseline.drive_digest == ("" if run.rollout is None else run.rollout.drive_digest)
     changed = _changed(hashes, baseline)
-    suspected, first = not same_drive and {*changed} <= {PLANNER_FILE}, fingerprint_of(s, run.plan, run.rollout)
+    suspected, first = not same_drive and {*changed} <= {*custom_modules(s)}, fingerprint_of(s, run.plan, run.rollout)
     if suspected and (is_unsteady(s, first) if changed else is_unsteady(s, first, elsewhere)):
         yield UNSTEADY
     elif not changed and "settings" in baseline.hashes:
@@ -161,7 +160,7 @@ def changes(s: Scenario, hashes: Mapping[str, str], baseline: Baseline, smoothin
         smoothing: that of the baseline if no other setting differs; empty if unknown
     """
     if changed := _changed(hashes, baseline):
-        words = {PLANNER_FILE: f"{PLANNER_FILE} ({module_file(type(s.planner).__module__).name})"}
+        words = {name: f"{name} ({module_file(module).name})" for name, module in custom_modules(s).items()}
         if smoothing:
             words["settings"] = f"settings (smoothing {smoothing} -> {s.smoothing})"
         yield f"changed since the baseline: {', '.join(words.get(name, name) for name in changed)}"
@@ -188,11 +187,14 @@ def _newer(baseline: Baseline) -> list[str]:
 
 def _same_parts(s: Scenario, baseline: Baseline) -> tuple[str, str]:
     """Return the compared parts of a setup, and the code that the comparison leaves out."""
-    if is_built_in(s.planner):
+    own = [*custom_modules(s)]
+    parts = [name.removesuffix(" file") for name in own]
+    if not own:
         return "world, robot and settings", "antdrive's code"
-    if PLANNER_FILE not in baseline.hashes:
-        return "world, robot and settings", "the code of the planner, antdrive's code"
-    return "world, robot, settings and planner file", "a module that the planner imports, antdrive's code"
+    if not {*own} <= {*baseline.hashes}:
+        return "world, robot and settings", f"the code of the {' and '.join(parts)}, antdrive's code"
+    imported = f"a module that the {' or '.join(parts)} imports"
+    return f"world, robot, {', '.join(['settings', *own][:-1])} and {own[-1]}", f"{imported}, antdrive's code"
 
 
 def _smoothing_of(run: Run, baseline: Baseline) -> str:

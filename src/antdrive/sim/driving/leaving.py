@@ -64,7 +64,7 @@ def _rehearsed(
         pose = body.observe().pose
         if not is_narrow(world, robot, pose):
             return None
-        command, state = controller.step(path, pose, command, state)
+        command, state = controller.pursue(path, pose, command, state)
         if halts and not any(command):
             break
         body.step(command)

@@ -54,7 +54,7 @@ def _rebuilt(rollout: Rollout) -> LoggedOdometry:
 
     The imports load compiled code, which tables of exact drives do not need.
     """
-    from antdrive.robots.control.pursuit import Twist
+    from antdrive.robots.control.observation import Twist
     from antdrive.robots.noise import moved
     from antdrive.sim.driving.senses import logged_positioning
     from antdrive.sim.physics.engine import State

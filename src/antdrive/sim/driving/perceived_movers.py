@@ -67,9 +67,13 @@ class PerceivedMovers(abc.ABC):
         flat = places.reshape(-1) + ahead[:, None] * velocities.reshape(-1)
         return flat.reshape(len(ahead), -1, 2), radii
 
+    def near(self, tick: int, position: Point) -> Movers:
+        """Return the perceived movers, with the observed velocities."""
+        return Movers(*self._near(tick, position))
+
     def velocities(self, tick: int, position: Point) -> Floats:
         """Return the observed velocities of the perceived movers (M, 2) [m/s]."""
-        return self._near(tick, position)[2]
+        return self.near(tick, position).velocities
 
     def within_range(self, tick: int, position: Point) -> Numbers:
         """Return the numbers (P,) of the perceived movers."""
@@ -114,9 +118,9 @@ class Given(PerceivedMovers):
         perceived, _, _, radii = self._near(tick, position)
         return np.ascontiguousarray(self._motions(ahead + tick / self._hz)[:, perceived]), radii
 
-    def velocities(self, tick: int, position: Point) -> Floats:
-        """Return the velocities of the perceived movers (M, 2) [m/s], also of those that are predicted to stay."""
-        return self._near(tick, position, self._given.velocities)[2]
+    def near(self, tick: int, position: Point) -> Movers:
+        """Return the perceived movers, with the velocities also of those that are predicted to stay."""
+        return Movers(*self._near(tick, position, self._given.velocities))
 
     def radius_of(self, mover: int) -> float:
         """Return the radius of a mover [m]."""

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from antdrive.base import Pose
-from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, TrackedPath, Twist
+from antdrive.robots import (
+    LIMITERS,
+    Avoidance,
+    AvoidanceState,
+    PurePursuit,
+    PursuitState,
+    RobotSpec,
+    TrackedPath,
+    Twist,
+)
+from antdrive.robots.control.controller import Following
 from antdrive.sim.driving.blockage import points_at
 from antdrive.sim.driving.guide import Moment, Wait
 from antdrive.sim.driving.habits import Habits
@@ -30,6 +40,7 @@ def slow_down(command: Twist, last: Twist, limit: float, max_change: float) -> T
 
 STEPPING_OUT = 1.2  # speed of people who step out of hidden ground [m/s]
 CORNER_STEP = 0.1  # between the places of a route that are compared with corners [m]
+STANDING = 0.01  # a robot that is slower than this turns on the spot [m/s], [rad/s]
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop within this fraction of the goal's tolerance
 AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
@@ -49,10 +60,24 @@ class Pursuit:
         """Return the controller's command."""
         last, before = now.before.command, now.before.pursuit
         if now.clock.turning <= self._full_turn:
-            return Step(*self._controller.step(now.way.path, now.pose, last, before))
-        return Step(
-            *self._controller.step(now.way.path.preferring_arcs, now.pose, last, before._replace(turning=False))
-        )
+            return Step(*self._controller.pursue(now.way.path, now.pose, last, before))
+        arcs = now.way.path.preferring_arcs
+        return Step(*self._controller.pursue(arcs, now.pose, last, before._replace(turning=False)))
+
+
+class ByController:
+    """Rule: follow the path by another controller, and measure the progress along it."""
+
+    def __init__(self, following: Following, movers: PerceivedMovers) -> None:
+        self._following, self._movers = following, movers
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """Return the controller's command."""
+        path, observed = now.way.path, now.observed
+        seen = observed._replace(movers=self._movers.near(now.tick, now.pose[:2]))
+        command = self._following.command(seen, path)
+        turning = abs(command.speed) < STANDING and abs(command.yaw_rate) >= STANDING
+        return Step(command, PursuitState(path.nearest(now.pose, now.before.pursuit.arc), turning))
 
 
 class TurnToScan:

@@ -112,9 +112,8 @@ def footprint_margins(record: DriveRecord) -> tuple[float, ...]:
         return ()
     robot, noise, margin = record.robot, record.noise, record.margin
     settings, own = record.controller.settings, record.controller.name != PurePursuit.__name__
-    known = {field.name for field in dataclasses.fields(PurePursuit)}
     restored = {key: math.inf if value is None else value for key, value in settings.items()}
-    controller = PurePursuit(**{key: value for key, value in restored.items() if key in known or not own})
+    controller = PurePursuit() if own else PurePursuit(**restored)
     usual = [default_margin(robot, controller, noise, kind) for kind in (record.smoothing.asked, "none")]
     of_lines = own or margin in usual or (record.margin_choice is not None and asked == "auto")
     margins = outline_margins(robot, controller, noise, margin, of_lines=of_lines)

@@ -512,6 +512,11 @@ def settings_of(values: Any) -> dict[str, Any]:
     return plain
 
 
+def options_of(component: Any) -> dict[str, Any]:
+    """Return the options of a planner or controller as plain values; none if it is no record."""
+    return settings_of(component) if dataclasses.is_dataclass(component) else {}
+
+
 def changes(values: Any, usual: Any) -> dict[str, Any]:
     """Return the fields of a record that differ from another record of its class."""
     names = (field.name for field in dataclasses.fields(values) if field.init)

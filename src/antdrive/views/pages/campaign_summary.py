@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.base.errors import FieldError
+from antdrive.runs.comparing import FAULTS
 from antdrive.runs.statistics.comparison import (
     ALPHA,
     SUCCESS,
@@ -161,7 +162,7 @@ def headline(table: RunTable, summary: CampaignSummary | None = None) -> list[tu
     size = summary.size if summary is not None else runs
     bounds, driven = table.numbers("bound_m"), table.numbers("driven_length_m")
     certified = np.array([value is not None for value in table.columns.get("certified", [None] * runs)])
-    died = outcomes.count("crashed") + outcomes.count("planner_fault")
+    died = sum(map(outcomes.count, ("crashed", *FAULTS)))
     counted = [(len(set(table.texts(name))), name) for name in ("planner", "world", "seed")]
     return [
         (f"{int(good.sum()):,} / {runs:,}", "reached the goal, certified collision-free"),

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from antdrive.base.atomic import write_text
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.files import file_name, known_suffix
-from antdrive.planners.user_code import record_name
+from antdrive.base.user_code import record_name
 from antdrive.runs.campaigns.results import common_folder, read_runs
 from antdrive.runs.campaigns.store import MANIFEST
 from antdrive.runs.statistics.run_table import HASHES, RunTable
@@ -84,6 +84,7 @@ SENTENCES = {
     **{outcome.key: outcome.value for outcome in Outcome},
     "crashed": "the process of the run died",
     "planner_fault": "the planner raised an error",
+    "controller_fault": "the controller raised an error",
     "too_slow": "the run took longer than the campaign allows",
 }
 

@@ -1,4 +1,4 @@
-"""Planners in users' files and modules: FILE.py:CLASS, or MODULE:CLASS."""
+"""Components in users' files and modules: FILE.py:CLASS, or MODULE:CLASS."""
 
 from __future__ import annotations
 
@@ -19,36 +19,42 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
+from antdrive.base.components import ComponentError
 from antdrive.base.document import MAX_BYTES
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import file_name, read_bytes
 from antdrive.base.guarded import OverLimit, UserCode, error_text, place, value_text
-from antdrive.planners.errors import PlannerError
 
 FROZEN_BASE = "cannot inherit non-frozen dataclass"  # message of Python about a dataclass without frozen=True
 DIGITS = 8  # hexadecimal digits of a file's hash
 FROM_FILE = "_antdrive_user_"  # name prefix of modules loaded from files
 
-#: Users' classes that this process has loaded, by their names in records; the latest of a name.
-LOADED: dict[str, Any] = {}
+#: Users' classes that this process has loaded, by their kinds and names in records; the latest of a name.
+LOADED: dict[tuple[str, str], Any] = {}
+#: The words that named users' code, by class: FILE.py:CLASS or MODULE:CLASS, seen from the working directory.
+_WORDS: dict[type, str] = {}
 #: The folder of each user module, by the module's name.
 _OWNERS: dict[str, Path] = {}
 #: Modules set aside while a module of the same name from another folder is in use.
 _ASIDE: dict[Path, dict[str, ModuleType]] = {}
 
 
+class _Unusable(FieldError):
+    """A user's file or module is missing, fails to import, or lacks the class."""
+
+
 def is_user_code(name: str) -> bool:
-    """Return whether a planner's name refers to a file or module instead of the registry."""
+    """Return whether a component's name refers to a file or module instead of the registry."""
     return ":" in name or name.endswith(".py")
 
 
 def record_name(name: str) -> str:
-    """Return a planner's name in records and tables: the registered name, or the class name in user code."""
+    """Return a component's name in records and tables: the registered name, or the class name in user code."""
     return name.rpartition(":")[2]
 
 
 def label_names(names: Sequence[str], taken: Collection[str] = ()) -> list[str]:
-    """Return labels for tables and folders: `Greedy` for `mine.py:Greedy`, or `mine-Greedy` if another planner is a Greedy.
+    """Return labels for tables and folders: `Greedy` for `mine.py:Greedy`, or `mine-Greedy` if another one is a Greedy.
 
     The names differ; labels in `taken` are in use.
     """
@@ -66,12 +72,7 @@ def label_names(names: Sequence[str], taken: Collection[str] = ()) -> list[str]:
     return found
 
 
-def _error(problem: str) -> InputError:
-    """Return the error of a user's file or module: it is missing, fails to import, or lacks the class."""
-    return FieldError("planner", problem).as_input()
-
-
-def user_object(name: str, home: Path | None = None) -> Any:
+def user_object(name: str, home: Path | None, kind: type[ComponentError]) -> Any:
     """Return a named object of a user's file or module.
 
     A file is read again after its content changes. Different folders may contain modules of the same name.
@@ -79,45 +80,73 @@ def user_object(name: str, home: Path | None = None) -> Any:
     Args:
         name: FILE.py:NAME or MODULE:NAME
         home: folder of the file or the module; None: the working directory
+        kind: the error of its kind of component
+
+    Raises:
+        InputError: the file or module is missing, fails to import, or lacks the name.
     """
+    try:
+        return _user_object(name, home, kind)
+    except _Unusable as error:
+        raise error.under(kind.kind).as_input() from error.__cause__
+
+
+def _user_object(name: str, home: Path | None, kind: type[ComponentError]) -> Any:
     source, _, word = (f"{name}:" if name.endswith(".py") else name).rpartition(":")
     is_file = source.endswith(".py")
     if is_file and home is not None and not (home / source).is_file():
-        raise _error(f"{source}: no such file beside the suite")
-    with UserCode(f"planner {source}:{word}", functools.partial(_import_error, source)):
+        raise _Unusable("", f"{source}: no such file beside the suite")
+    with UserCode(f"{kind.kind} {source}:{word}", functools.partial(_import_error, source, kind), (_Unusable,)):
         module = _from_file(source, home) if is_file else _from_module(source, home)
     if not word:
-        raise _error(f"{source} names no class; write {source}:CLASS; {_choices(module, word)}")
+        raise _Unusable("", f"{source} names no class; write {source}:CLASS; {_choices(module, word, kind)}")
     if not hasattr(module, word):
-        raise _error(f"{source} has no {word!r}; {_choices(module, word)}")
-    LOADED[word] = getattr(module, word)
-    return LOADED[word]
+        raise _Unusable("", f"{source} has no {word!r}; {_choices(module, word, kind)}")
+    made = LOADED[kind.kind, word] = getattr(module, word)
+    path = (home or Path()) / (source if is_file else f"{source}.py")
+    beside = home is not None and path.is_file()
+    _WORDS[made if isinstance(made, type) else type(made)] = f"{os.path.relpath(path)}:{word}" if beside else name
+    return made
 
 
-def _import_error(source: str, error: BaseException) -> InputError | PlannerError:
+def word_of(component: object) -> str | None:
+    """Return the words that named a component of user code in this process, FILE.py:CLASS or MODULE:CLASS; None if none did."""
+    return _WORDS.get(type(component))
+
+
+def _import_error(source: str, kind: type[ComponentError], error: BaseException) -> Exception:
     """Return the error of a file or module that cannot be imported."""
     at = place(error, os.path.realpath(source))
     if issubclass(type(error), OverLimit):
-        return PlannerError(source, f"{error_text(error)} on import ({at})")
+        return kind(source, f"{error_text(error)} on import ({at})")
     if issubclass(type(error), SystemExit):
         problem = f"{source}: calls exit on import (exit code {value_text(error.args[0] if error.args else 0)}, {at})"
-        return _error(f'{problem}; guard its script code with if __name__ == "__main__"')
+        return _Unusable("", f'{problem}; guard its script code with if __name__ == "__main__"')
     for frame, _ in traceback.walk_tb(error.__traceback__):
         declared = frame.f_locals.get("cls")
         if frame.f_code.co_name == "_process_class" and FROZEN_BASE in error_text(error):
             name = getattr(declared, "__name__", "the class")
-            return _error(f"{source}: {name} needs @dataclass(frozen=True), as its base class has ({at})")
-    return _error(f"{source}: cannot be imported ({', '.join(filter(None, (error_text(error), at)))})")
+            return _Unusable("", f"{source}: {name} needs @dataclass(frozen=True), as its base class has ({at})")
+    return _Unusable("", f"{source}: cannot be imported ({', '.join(filter(None, (error_text(error), at)))})")
 
 
-def is_importable_elsewhere(planner: object) -> bool:
-    """Return whether other processes can import a planner's class; false for files and for modules beside a suite."""
-    home = type(planner).__module__
+def is_importable_elsewhere(component: object) -> bool:
+    """Return whether other processes can import a component's class; false for files and for modules beside a suite."""
+    home = type(component).__module__
     return not home.startswith(FROM_FILE) and home not in _OWNERS
 
 
-def user_code_version(name: str) -> str:
-    """Return the name of a user's file or module with the beginning of its hash."""
+def user_code_version(name: str, kind: type[ComponentError]) -> str:
+    """Return the name of a user's file or module with the beginning of its hash.
+
+    Args:
+        name: FILE.py:NAME or MODULE:NAME
+        kind: the error of its kind of component
+
+    Raises:
+        InputError: it cannot be loaded.
+    """
+    user_object(name, None, kind)
     source = name.rpartition(":")[0]
     if source.endswith(".py"):
         return f"{Path(source).name} {_hash(_content(Path(source)))}"
@@ -143,16 +172,16 @@ def _content(path: Path) -> bytes:
     try:
         return read_bytes(path, MAX_BYTES, "a Python file")
     except InputError as error:
-        raise _error(str(error)) from None
+        raise _Unusable("", str(error)) from None
 
 
-def _choices(module: ModuleType, word: str) -> str:
-    """Return a hint for an unknown name: the closest match, the module's planners, or all its names."""
+def _choices(module: ModuleType, word: str, kind: type[ComponentError]) -> str:
+    """Return a hint for an unknown name: the closest match, the module's components of a kind, or all its names."""
     known = {name: value for name, value in vars(module).items() if not name.startswith("_")}
     own = {name: value for name, value in known.items() if getattr(value, "__module__", None) == module.__name__}
-    planners = [name for name, value in own.items() if inspect.getattr_static(value, "plan", None) is not None]
-    close = difflib.get_close_matches(word, planners or known, n=1)
-    return f"did you mean {close[0]}?" if close else f"it has {', '.join(planners or known) or 'nothing'}"
+    fitting = [name for name, value in own.items() if inspect.getattr_static(value, kind.methods[0], None) is not None]
+    close = difflib.get_close_matches(word, fitting or known, n=1)
+    return f"did you mean {close[0]}?" if close else f"it has {', '.join(fitting or known) or 'nothing'}"
 
 
 def _from_module(name: str, folder: Path | None) -> ModuleType:
@@ -166,7 +195,7 @@ def _from_module(name: str, folder: Path | None) -> ModuleType:
     if own is not None and taken is not None and Path(taken).resolve() != own:
         where = "beside the suite" if folder is not None else "in the working directory"
         problem = f"{top} is imported from {taken}, but another one exists {where}"
-        raise _error(f"{problem}; rename it, or name its file")
+        raise _Unusable("", f"{problem}; rename it, or name its file")
     return module
 
 

@@ -1,0 +1,1 @@
+"""Built-in controllers besides `PurePursuit`, and the registry of controllers."""
