@@ -36,7 +36,7 @@ def path_of(points, world=EMPTY):
 
 def driven(controller, path, pose=(1.0, 1.0, 0.0), limit=40.0, goal=(5.0, 1.0)):
     """The poses and commands of a robot that executes commands exactly."""
-    following = Following(controller, "tested", Briefing(robot=ROBOT, goal=goal, tolerance=0.1, map=None, hz=HZ))
+    following = Following(controller, "tested", Briefing(ROBOT, pose, goal, 0.1, HZ))
     command, poses, commands = Twist(0.0, 0.0), [pose], []
     for tick in range(round(limit * HZ)):
         command = following.command(Observation(tick, tick / HZ, pose, command, command), path)

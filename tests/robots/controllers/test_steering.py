@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from antdrive.robots import Observation, Twist
+from antdrive.robots.control.observation import Movers
 from antdrive.robots.controllers.coulter import Coulter, turn_on_spot
 from antdrive.robots.controllers.dwa import DynamicWindow, WindowState, free_arcs
 from antdrive.robots.controllers.stanley import Stanley
@@ -14,6 +15,7 @@ from antdrive.worlds import Disc, World
 from tests.robots.controllers.test_contract import EMPTY, ROBOT, path_of
 
 LINE = path_of([(0.5, 2.0), (7.5, 2.0)])
+MOVER = Movers(np.zeros(1, int), np.array([[3.45, 2.0]]), np.zeros((1, 2)), np.array([0.2]))
 WALLS = (0.0, 0.0, 8.0, 8.0)
 
 
@@ -97,7 +99,7 @@ def test_dwa_chooses_only_velocities_from_which_it_can_stop():
 
 
 def test_dwa_sees_movers_as_discs_at_rest():
-    mover = at((3.0, 2.0, 0.0))._replace(movers=np.array([[3.45, 2.0, 0.0, 0.0, 0.2]]))
+    mover = at((3.0, 2.0, 0.0))._replace(movers=MOVER)
     free, _ = DynamicWindow().step(at((3.0, 2.0, 0.0)), LINE, WindowState(2.5, ROBOT.radius))
     held, _ = DynamicWindow().step(mover, LINE, WindowState(2.5, ROBOT.radius))
     assert held.speed < free.speed

@@ -524,7 +524,7 @@ def test_a_robot_without_a_path_at_the_end_of_its_route_keeps_searching_for_a_wh
     exploration.lost = lost
     robot.step = Step(pursuit=PursuitState(arc=tracked.length))
     exploration.trigger = lambda *_: ""
-    command, _ = robot.act(Observation(0, 0.0, HERE, (), Twist(0.0, 0.0)))
+    command, _ = robot.act(Observation(0, 0.0, HERE, Twist(0.0, 0.0)))
     assert (command is not None) == lost
     assert asked == ([] if lost else ["missed the goal"])
 

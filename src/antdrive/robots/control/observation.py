@@ -52,9 +52,9 @@ class Observation(NamedTuple):
         tick: the number of the control period
         t: time since the start [s]
         pose: estimated pose
-        pending: the commands that have not reached the motors yet, oldest first
         twist: measured velocity
         command: the last command
+        pending: the commands that have not reached the motors yet, oldest first
         scan: ranges of a scan (beams,) [m]; None if none was due
         movers: perceived movers
     """
@@ -62,9 +62,9 @@ class Observation(NamedTuple):
     tick: int
     t: float
     pose: Pose
-    pending: tuple[Twist, ...]
     twist: Twist
     command: Twist = Twist(0.0, 0.0)
+    pending: tuple[Twist, ...] = ()
     scan: Floats | None = None
     movers: Movers = NOBODY
 

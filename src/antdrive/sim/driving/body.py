@@ -71,7 +71,7 @@ class Body:
             scan = self._lidar.scan(self.tick, state.pose) if self._lidar else None
             twist, pending = Twist(state.speed, state.yaw_rate), tuple(self._senses.pending)
             movers = self._movers.read(self.tick, pose[:2]) if self._movers else NOBODY
-            self._now = Observation(self.tick, self.tick / self._hz, pose, pending, twist, self._command, scan, movers)
+            self._now = Observation(self.tick, self.tick / self._hz, pose, twist, self._command, pending, scan, movers)
         return self._now
 
     def step(self, command: Twist | None, note: Note = SILENT) -> None:
