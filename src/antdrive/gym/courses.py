@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import os
 import tempfile
 from collections.abc import Callable, Mapping
@@ -16,9 +17,11 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.robots import RobotSpec, overlap_at
 from antdrive.runs.barn_challenge import WORLDS, unpacked
 from antdrive.worlds import Task, Wandering, import_barn, import_dynabarn, load_task
-from antdrive.worlds.generators.generate import GENERATORS, generated
+from antdrive.worlds.generators.generate import BARN_FILLS, BARN_ROUNDS, GENERATORS, generated
 
 Source: TypeAlias = str | os.PathLike[str] | Task
+#: Fill ratios and smoothing rounds of generated BARN-like worlds, in turn; as often in the set's 300 worlds.
+BARN_MIX = tuple(itertools.product(BARN_FILLS, BARN_ROUNDS))
 #: Sets of third-party worlds: what `source` must name.
 SETS = {
     "barn50": "the folder or archive of the BARN challenge's world_N.world files",
@@ -52,10 +55,17 @@ def course_of(
     if kind in GENERATORS:
         if worlds < 1:
             raise InputError(f"worlds: must be at least 1, got {worlds}")
+        if source is not None:
+            raise InputError(f"source: {kind} has generated worlds alone; World-v0 and Barn50-v0 take a source")
         room = {} if kind == "office" else {"robot_radius": round(robot.radius + 0.03, 3)}
-        given = {**room, **options}.items()
-        texts = tuple((key, ",".join(map(str, v)) if isinstance(v, tuple | list) else str(v)) for key, v in given)
-        return Course(worlds, lambda number: generated(kind, number, texts))
+
+        def drawn(number: int) -> Task:
+            mixed = dict(zip(("fill", "rounds"), BARN_MIX[number % len(BARN_MIX)], strict=True)) if kind == "barn" else {}
+            given = {**room, **mixed, **options}.items()
+            texts = ((key, ",".join(map(str, v)) if isinstance(v, tuple | list) else str(v)) for key, v in given)
+            return generated(kind, number, tuple(texts))
+
+        return Course(worlds, drawn)
     if kind == "world":
         task = task_of("forest" if source is None else source)
         return Course(1, lambda number: task)

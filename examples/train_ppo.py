@@ -1,0 +1,111 @@
+"""PPO that learns among BARN-like worlds on the kinematic plant, and drives BARN's own worlds in physics.
+
+    python examples/train_ppo.py train policy.zip                       # at most 15 minutes of one core
+    python examples/train_ppo.py drive policy.zip BARN drives.csv       # 50 worlds x 10 seeds; continues where it ended
+    python examples/train_ppo.py table drives.csv
+
+BARN is the folder or archive of the challenge's worlds (docs/how-to/data.md). Needs the extra `gym` and stable-baselines3.
+"""
+
+import csv
+import math
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecMonitor
+
+from antdrive.gym import NavigationEnv
+from antdrive.gym.sb3 import NavigationVecEnv
+from antdrive.runs.barn_challenge import OFFICIAL, PATHS, reference_times, unpacked
+from antdrive.sim import measure
+
+SEEDS, MINUTES, ROBOTS = 10, 14, 128
+SHARED = {"noise": 1.0, "reach": 4.0, "flat": True}
+COLUMNS = ("world", "seed", "outcome", "certified", "score", "exact", "seconds", "contact", "clearance_m", "digest")
+torch.set_num_threads(1)  # more are slower for networks of this size
+
+
+class Clock(BaseCallback):
+    """Stop after some minutes of processor time, and show the success of the last thousand episodes."""
+
+    def _on_step(self) -> bool:
+        return time.process_time() < 60 * MINUTES
+
+    def _on_rollout_end(self) -> None:
+        ended = self.model.ep_success_buffer
+        if self.n_calls % 6400 == 0 and ended:
+            took = time.process_time() / 60
+            print(f"{took:.1f} min, {self.num_timesteps} steps: {np.mean(ended):.1%} arrived", flush=True)
+
+
+def train(policy: Path) -> None:
+    """Train a policy, and print the success that training reports."""
+    robots = NavigationVecEnv(ROBOTS, "barn", worlds=600, steps=400, **SHARED)
+    robots.seed(0)
+    model = PPO(
+        "MlpPolicy", VecMonitor(robots), n_steps=64, batch_size=2048, n_epochs=5, gamma=0.995, seed=0, device="cpu",
+        learning_rate=lambda left: 5e-4, ent_coef=1e-3, stats_window_size=1000, policy_kwargs={"net_arch": [128, 128]},
+    )  # fmt: skip
+    model.learn(10**9, callback=Clock())
+    model.save(policy)
+    print(f"{model.num_timesteps} steps, {np.mean(model.ep_success_buffer):.1%} of the last 1,000 episodes arrived")
+
+
+def drive(policy: Path, barn: Path, drives: Path, plant: str = "bullet") -> None:
+    """Drive the policy in each world with each seed, a line each in a table; lines that are there are kept."""
+    model = PPO.load(policy, device="cpu")
+    with tempfile.TemporaryDirectory() as folder:
+        fastest = reference_times(unpacked(barn, Path(folder), PATHS))
+    env = NavigationEnv("barn50", source=barn, plant=plant, steps=1000, rollouts=True, **SHARED)
+    done = {(row["world"], row["seed"]) for row in csv.DictReader(drives.open())} if drives.exists() else set()
+    with drives.open("a", newline="") as file:
+        table = csv.DictWriter(file, COLUMNS)
+        if not done:
+            table.writeheader()
+        for task in env.tasks:
+            for seed in range(SEEDS):
+                if (task.world.name, str(seed)) not in done:
+                    table.writerow(driven(model, env, task, seed, fastest[task.world.name]))
+                    file.flush()
+
+
+def driven(model: PPO, env: NavigationEnv, task: object, seed: int, fastest: float) -> dict[str, object]:
+    """Drive one episode; return its line."""
+    observation, info = env.reset(seed=seed, options={"world": task})
+    over, clearance = False, info["clearance_m"]
+    while not over:
+        action, _ = model.predict(observation, deterministic=True)
+        observation, _, terminated, truncated, info = env.step(action)
+        over, clearance = terminated or truncated, min(clearance, info["clearance_m"])
+    line = {"world": task.world.name, "seed": seed, "outcome": info["outcome"], "contact": info["collision"]}
+    line |= {"clearance_m": round(clearance, 4), "digest": info["digest"]}
+    if "rollout" in info:
+        measured = measure(info["rollout"])
+        succeeded, seconds = info["is_success"], measured["arrival_s"]
+        line |= {"certified": info["certificate"].certified, "seconds": seconds, "exact": measured["barn"]}
+        line |= {"score": OFFICIAL.score(succeeded, seconds, fastest), "clearance_m": measured["min_clearance_m"]}
+    return line
+
+
+def table(drives: Path) -> None:
+    """Print the drives' shares."""
+    rows = list(csv.DictReader(drives.open()))
+    arrived = [row for row in rows if row["outcome"] == "succeeded"]
+    certified = [row for row in arrived if row["certified"] == "True"]
+    print(f"{len(rows)} drives in {len({row['world'] for row in rows})} worlds")
+    print(f"arrived {len(arrived) / len(rows):.1%}, certified at the goal {len(certified) / len(rows):.1%}")
+    print(f"contact {sum(row['contact'] == 'True' for row in rows) / len(rows):.1%}")
+    for key in ("score", "exact"):
+        print(f"mean {key} {math.fsum(float(row[key] or 0) for row in rows) / len(rows):.4f}")
+
+
+if __name__ == "__main__":
+    COMMANDS = {"train": train, "drive": drive, "table": table}
+    name, *arguments = sys.argv[1:]
+    COMMANDS[name](*(Path(one) if "." in one or "/" in one else one for one in arguments))
