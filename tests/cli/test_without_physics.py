@@ -127,4 +127,4 @@ def test_warm_leaves_out_drives(folder, monkeypatch):
     monkeypatch.setattr(warming, "_marker", lambda: folder / "warm")
     warming.warm(1)
     assert groups
-    assert None not in groups
+    assert warming.drive_and_film not in groups

@@ -50,6 +50,17 @@ def test_a_drive_commanded_from_outside_is_logged_and_certified(scenario, tmp_pa
         rerun(again)
 
 
+def test_the_true_pose_is_that_of_the_log(scenario):
+    with Session(scenario) as drive:
+        poses = [drive.true_pose]
+        for _ in range(3):
+            drive.step(Twist(0.3, 0.1))
+            poses.append(drive.true_pose)
+    assert [tuple(pose) for pose in drive.rollout.pose[::4].tolist()] == poses
+    with pytest.raises(FieldError, match="true_pose: there is no drive"):
+        _ = Session(scenario).true_pose
+
+
 def test_a_session_that_is_left_early_has_an_honest_log(scenario):
     done = followed(scenario, periods=5)
     assert (done.outcome, len(done.rollout.t)) == (Outcome.STOPPED, 1 + 5 * 4)

@@ -60,7 +60,9 @@ def course_of(
         room = {} if kind == "office" else {"robot_radius": round(robot.radius + 0.03, 3)}
 
         def drawn(number: int) -> Task:
-            mixed = dict(zip(("fill", "rounds"), BARN_MIX[number % len(BARN_MIX)], strict=True)) if kind == "barn" else {}
+            mixed = (
+                dict(zip(("fill", "rounds"), BARN_MIX[number % len(BARN_MIX)], strict=True)) if kind == "barn" else {}
+            )
             given = {**room, **mixed, **options}.items()
             texts = ((key, ",".join(map(str, v)) if isinstance(v, tuple | list) else str(v)) for key, v in given)
             return generated(kind, number, tuple(texts))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from antdrive.base import Pose
 from antdrive.base.errors import FieldError
 from antdrive.base.guarded import error_text
 from antdrive.base.progress import progress_bar
@@ -108,6 +109,17 @@ class Session:
         """The result, with its log and certificate, once the `with` block is left."""
         log = self.rollout
         return Run(self._scenario, self.grid, self.plan, log, None if log is None else certify(log))
+
+    @property
+    def true_pose(self) -> Pose:
+        """True pose of the axle's centre, for rewards and tests: a controller must not read it.
+
+        Raises:
+            FieldError: physics is not open.
+        """
+        if self._body is None:
+            raise FieldError("true_pose", "there is no drive: use `with`")
+        return self._plant.state.pose
 
     def observe(self) -> Observation:
         """Return what the robot observes in this control period.
