@@ -21,14 +21,7 @@ ACTION_HZ, CONTROL_HZ, PHYSICS_HZ = 10, 60, 240
 SCAN_RATE = ACTION_HZ * (1 + 1e-6)  # due at each action, whatever the rounding [Hz]
 MOST_DELAY = CONTROL_HZ  # control periods in the longest delay that `Noise` allows
 #: How an episode ended, by the kernels' number; None while it goes on.
-ENDINGS = (
-    None,
-    Outcome.SUCCEEDED,
-    Outcome.STUCK,
-    Outcome.COLLIDED,
-    Outcome.HIT_WHILE_STANDING,
-    Outcome.HIT_BY_TELEPORT,
-)
+ENDINGS = (None, *map(Outcome.__getitem__, ("SUCCEEDED", "STUCK", "COLLIDED", "HIT_WHILE_STANDING", "HIT_BY_TELEPORT")))
 
 
 class Episode(NamedTuple):
@@ -135,21 +128,21 @@ class KinematicPlant:
 
     def _add(self, task: Task) -> None:
         """Add a task's world to the maps."""
-        world, maps, eye = task.world, self._maps, self._eye
+        world, maps, movers = task.world, self._maps, Trajectories.of(task.world, task.start[:2])
         discs, heights = world.discs, np.array([disc.height for disc in world.obstacles])
-        visible = discs[heights >= eye] if len(discs) else discs
-        movers = Trajectories.of(world, task.start[:2])
-        radii = np.where(movers.heights >= eye, movers.radii, -movers.radii) if len(movers) else np.empty(0)
+        visible = discs[heights >= self._eye]
+        radii = np.where(movers.heights >= self._eye, movers.radii, -movers.radii)
         tracks = movers.positions(np.arange(self._periods if len(movers) else 0) / CONTROL_HZ)
-        parts = (discs.ravel(), visible.T.ravel(), radii, tracks.ravel())
-        old = (maps.discs, maps.visible, maps.radii, maps.tracks)
-        first, seen, mover, track = map(len, old)
-        row = (first, len(discs), seen, len(visible), mover, len(radii), track)
-        self._maps = kernels.Maps(
-            np.vstack((maps.rows, row)),
-            np.vstack((maps.bounds, world.bounds)),
-            *map(np.concatenate, zip(old, parts, strict=True)),
+        row = (len(maps.discs), len(discs), len(maps.visible), len(visible), len(maps.radii), len(radii))
+        parts: Any = (
+            [[*row, len(maps.tracks)]],
+            [world.bounds],
+            discs.ravel(),
+            visible.T.ravel(),
+            radii,
+            tracks.ravel(),
         )
+        self._maps = kernels.Maps(*(np.concatenate(pair) for pair in zip(maps, parts, strict=True)))
 
 
 def _shared_spec(robot: RobotSpec, lidar: Lidar) -> Any:

@@ -23,15 +23,15 @@ class PhysicsPlant(KinematicPlant):
 
     def __init__(self, robot: RobotSpec, number: int, steps: int) -> None:
         super().__init__(robot, number, steps)
-        self._settings = {"margin": 0.0, "perception": Perception(kind="lidar"), "time_limit": steps / ACTION_HZ}
-        self._settings |= {"control_hz": CONTROL_HZ, "physics_hz": PHYSICS_HZ}
+        rates = {"control_hz": CONTROL_HZ, "physics_hz": PHYSICS_HZ, "time_limit": steps / ACTION_HZ}
+        self._settings: dict[str, Any] = {"margin": 0.0, "perception": Perception(kind="lidar"), **rates}
         self._drives, self._results = dict[int, Session](), dict[int, dict[str, Any]]()
 
     def _start(self, i: int, episode: Episode) -> None:
         self.leave(i)
         self.robots.ending[i] = 0
-        task, facts = episode.task, {"seed": episode.seed, "noise": episode.noise}
-        drive = Session(Scenario.of(task, "astar", self._spec, **self._settings, **facts))
+        task, (_, _, seed, noise) = episode.task, episode
+        drive = Session(Scenario.of(task, "astar", self._spec, seed=seed, noise=noise, **self._settings))
         if drive.path is None:
             raise InputError(f"plant: bullet needs a path for its log, but in {task.world.name}: {drive.plan.reason}")
         self._drives[i] = drive.__enter__()
@@ -44,7 +44,7 @@ class PhysicsPlant(KinematicPlant):
         for i in np.flatnonzero(chosen).tolist():
             drive, before = self._drives[i], robots.facts[i, kernels.DISTANCE]
             for _ in range(CONTROL_HZ // ACTION_HZ):
-                kernels.decide(i, *actions[i].tolist(), self._shared, robots)
+                kernels.decide(i, float(actions[i, 0]), float(actions[i, 1]), self._shared, robots)
                 drive.step(Twist(*robots.state[i, kernels.TO_SPEED : kernels.TO_TURN + 1].tolist()))
                 if not drive.ended:
                     self._observe(i)

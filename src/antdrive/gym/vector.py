@@ -97,8 +97,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         self._terms = terms_of(reward)
         self._hidden = () if rollouts else ("rollout",)
         self._plant = plant_of(plant)(self._robot, num_envs, steps)
-        self._tasks: dict[int, Task] = {}
-        self.rngs = list[np.random.Generator]()  # one for each robot
+        self.rngs: list[np.random.Generator | None] = [None] * num_envs
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._over = np.ones(num_envs, dtype=np.bool_)
         self._painters: dict[int, tuple[Task, Any]] = {}  # of each robot
@@ -128,17 +127,12 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         if chosen.shape != (self.num_envs,) or chosen.dtype != np.bool_:
             raise InputError(f"options: reset_mask must be {self.num_envs} booleans")
         seeds = (
-            [None if seed is None else seed + i for i in range(self.num_envs)]
-            if not isinstance(seed, Sequence)
-            else seed
+            seed if isinstance(seed, Sequence) else [seed if seed is None else seed + i for i in range(self.num_envs)]
         )
         if len(seeds) != self.num_envs:
             raise InputError(f"seed: must be one for each of {self.num_envs} robots, got {len(seeds)}")
-        fresh = not self.rngs
         for i in range(self.num_envs):
-            if fresh:
-                self.rngs.append(seeding.np_random(seeds[i])[0])
-            elif seeds[i] is not None and chosen[i]:
+            if self.rngs[i] is None or (seeds[i] is not None and chosen[i]):
                 self.rngs[i] = seeding.np_random(seeds[i])[0]
             if chosen[i]:
                 self._begin(i, options)
@@ -161,7 +155,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         if wanted.shape != (self.num_envs, 2) or not np.isfinite(wanted).all():
             raise InputError(f"actions: must be finite numbers of shape ({self.num_envs}, 2), got {actions!r:.100}")
         mode, fresh = self.metadata["autoreset_mode"], self._over
-        if not self.rngs or (mode is AutoresetMode.DISABLED and fresh.any()):
+        if self.rngs[0] is None or (mode is AutoresetMode.DISABLED and fresh.any()):
             raise ResetNeeded("call reset first: an episode has ended")
         chosen, robots = ~fresh, self._plant.robots
         np.clip(wanted, -1.0, 1.0, out=wanted)
@@ -213,12 +207,12 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _begin(self, i: int, options: Mapping[str, Any] = MappingProxyType({})) -> None:
         """Put robot i at the start of its next episode."""
-        number, seed = int(self.rngs[i].integers(self._course.count)), int(self.rngs[i].integers(2**32))
-        world, ends = options.get("world"), {key: options.get(key) for key in ("start", "goal")}
-        if world is None and number not in self._tasks:
-            self._tasks[number] = task_of(repeated(self._course.task(number), number), self._robot)
-        task = self._tasks[number] if world is None else repeated(task_of(world), 0)
-        if world is not None or any(end is not None for end in ends.values()):
+        rng, world = self.rngs[i], options.get("world")
+        assert rng is not None  # `reset` made it
+        number, seed = int(rng.integers(self._course.worlds)), int(rng.integers(2**32))
+        task = self._course.task(number) if world is None else repeated(task_of(world), 0)
+        ends = {key: options[key] for key in ("start", "goal") if options.get(key) is not None}
+        if world is not None or ends:
             task = task_of(task, self._robot, **ends)
         key = number if world is None else task.world, task.start if task.world.movers else None
         noise = self._noise if options.get("noise") is None else self._factor(options["noise"])

@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from antdrive.base import kernel_cache
 from antdrive.base.errors import InputError
@@ -46,7 +46,8 @@ def warm(jobs: int | None = None, progress: Callable[[float], None] | None = Non
     from antdrive.runs.pool import Pool, cores
 
     marker = _marker()
-    works = [*([drive_and_film] if has_physics() else []), *([drive_batch] if _has_gymnasium() else []), *PLANNERS]
+    works: list[Any] = [drive_and_film] if has_physics() else []
+    works += [*([drive_batch] if _has_gymnasium() else []), *PLANNERS]
     with Pool(jobs or cores()) as pool:
         for done, _ in enumerate(pool.results(_compile, works, in_order=False), 1):
             if progress is not None:
