@@ -8,6 +8,7 @@ import pytest
 
 pytest.importorskip("gymnasium", reason="needs the extra `gym`")
 
+from antdrive.cli import warming
 from antdrive.gym import _kernels_batch as kernels
 from antdrive.gym.batch import CONTROL_HZ, ENDINGS, PHYSICS_HZ, Episode, KinematicPlant, thinned
 from antdrive.robots import Footprint, footprint_clearance, load_robot
@@ -15,7 +16,6 @@ from antdrive.robots.noise import SLIP_TIME
 from antdrive.runs.pool import Pool
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.sensing.scanner import Scanner
-from antdrive.views import warming
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, generate
 
 ROBOT = thinned(load_robot("jackal"), 64, 10.0)

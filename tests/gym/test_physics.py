@@ -10,6 +10,7 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 import antdrive.sim  # noqa: E402
 from antdrive.base.errors import InputError  # noqa: E402
 from antdrive.gym import NavigationEnv  # noqa: E402
+from antdrive.views.film.video import film  # noqa: E402
 from antdrive.worlds import Cruising, Disc, Task, World  # noqa: E402
 
 WORLD = World("open", (0.0, 0.0, 8.0, 4.0), (Disc(6.0, 3.0, 0.3),))
@@ -43,6 +44,27 @@ def test_an_episode_in_physics_ends_with_a_certified_log():
     assert info["certificate"].certified
     assert info["digest"] == info["rollout"].digest
     assert not antdrive.sim.certify(info["rollout"]).problems
+    assert info["rollout"].record.controller.name == "Session"
+
+
+def test_an_episode_in_physics_is_filmed(tmp_path):
+    _, steps = driven(OPEN, [(0.4, 0.0)] * 2, plant="bullet", rollouts=True, steps=2)
+    film(steps[-1][-1]["rollout"], tmp_path / "episode.mp4", size=(160, 160), fps=2)
+    assert (tmp_path / "episode.mp4").stat().st_size > 1000
+
+
+def test_physics_in_processes_is_physics_in_one():
+    digests = []
+    for mode in ("async", "sync"):
+        robots = gymnasium.make_vec(
+            "antdrive/World-v0", num_envs=2, vectorization_mode=mode, source=OPEN, plant="bullet", steps=2
+        )
+        robots.reset(seed=3)
+        for _ in range(2):
+            info = robots.step(np.full((2, 2), 0.2))[-1]
+        digests.append(info["digest"].tolist())
+        robots.close()
+    assert digests[0] == digests[1]
 
 
 def test_a_seed_repeats_an_episode_in_physics():

@@ -19,15 +19,25 @@ WEIGHTS = MappingProxyType({"goal": 4.0, "contact": -5.0, "progress": 0.25, "ste
 
 
 class Facts(NamedTuple):
-    """What happened to each of N robots in an action; what is true, not what the robot knows."""
+    """What happened to each of N robots in an action; what is true, not what the robot knows.
 
-    arrived: Flags  # whether it stopped at the goal (N,)
-    contact: Flags  # whether it touched something (N,)
-    progress: Floats  # how much nearer the goal is (N,) [m]
-    distance: Floats  # distance to the goal (N,) [m]
-    clearance: Floats  # distance from the footprint to the nearest surface (N,) [m]; at most 0 in contact
-    observation: Floats  # what the robots observe, flat (N, beams + 5)
-    actions: Floats  # the actions (N, 2)
+    Attributes:
+        arrived: whether it stopped at the goal (N,)
+        contact: whether it touched something (N,)
+        progress: how much nearer the goal is (N,) [m]
+        distance: distance to the goal (N,) [m]
+        clearance: distance from the footprint to the nearest surface (N,) [m]; at most 0 in contact
+        observation: what the robots observe, flat (N, beams + 5)
+        actions: the actions (N, 2)
+    """
+
+    arrived: Flags
+    contact: Flags
+    progress: Floats
+    distance: Floats
+    clearance: Floats
+    observation: Floats
+    actions: Floats
 
 
 #: Other weights by name, or a function of the facts that returns the rewards (N,).

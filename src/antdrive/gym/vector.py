@@ -93,7 +93,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         self.num_envs, self.render_mode = num_envs, render_mode
         self._robot = thinned(robot if isinstance(robot, RobotSpec) else load_robot(robot), beams, reach)
         self._course = course_of(course, self._robot, worlds, source, options)
-        self._noise, self._limit, self._flat, self._beams = self._factor(noise), steps, flat, beams
+        self._noise, self._limit, self._flat = self._factor(noise), steps, flat
         self._terms = terms_of(reward)
         self._hidden = () if rollouts else ("rollout",)
         self._plant = plant_of(plant)(self._robot, num_envs, steps)
@@ -101,7 +101,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._over = np.ones(num_envs, dtype=np.bool_)
         self._painters: dict[int, tuple[Task, Any]] = {}  # of each robot
-        self.single_observation_space = _observations(beams, flat)
+        self.single_observation_space = _space(beams, flat)
         self.single_action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -126,9 +126,8 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         chosen = np.array(options.get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
         if chosen.shape != (self.num_envs,) or chosen.dtype != np.bool_:
             raise InputError(f"options: reset_mask must be {self.num_envs} booleans")
-        seeds = (
-            seed if isinstance(seed, Sequence) else [seed if seed is None else seed + i for i in range(self.num_envs)]
-        )
+        count = self.num_envs
+        seeds = seed if isinstance(seed, Sequence) else [None if seed is None else seed + i for i in range(count)]
         if len(seeds) != self.num_envs:
             raise InputError(f"seed: must be one for each of {self.num_envs} robots, got {len(seeds)}")
         for i in range(self.num_envs):
@@ -231,14 +230,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _observation(self) -> Any:
         """Return what the robots observe, in new arrays."""
-        seen, beams = self._plant.robots.seen.astype(np.float32), self._beams
-        if self._flat:
-            return seen
-        return {
-            "scan": seen[:, :beams].copy(),
-            "goal": seen[:, beams : beams + 3].copy(),
-            "velocity": seen[:, beams + 3 :].copy(),
-        }
+        return _arranged(self._plant.robots.seen.astype(np.float32), self._flat)
 
     def _facts(self, actions: Floats) -> Facts:
         robots = self._plant.robots
@@ -270,13 +262,13 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
 
 def plant_of(name: str) -> type[KinematicPlant]:
     """Return the class of a plant."""
-    if name == "bullet":
-        from antdrive.gym.physics import PhysicsPlant
-
-        return PhysicsPlant
-    if name != "kinematic":
+    if name == "kinematic":
+        return KinematicPlant
+    if name != "bullet":
         raise InputError(f"plant: unknown {name!r}; choose kinematic or bullet")
-    return KinematicPlant
+    from antdrive.gym.physics import PhysicsPlant
+
+    return PhysicsPlant
 
 
 def compositor_of(task: Task, robot: RobotSpec) -> Any:
@@ -295,13 +287,14 @@ def _masked(values: Mapping[str, Any], mask: Flags) -> dict[str, Any]:
     return {name: part for key, value in values.items() for name, part in ((key, value), (f"_{key}", mask.copy()))}
 
 
-def _observations(beams: int, flat: bool) -> spaces.Space[Any]:
-    low = {"scan": np.zeros(beams), "goal": np.array((0.0, -1.0, -1.0)), "velocity": np.array((-1.0, -1.0))}
-    boxes: dict[str, spaces.Space[Any]] = {
-        key: spaces.Box(value.astype(np.float32), np.float32(1.0), value.shape, np.float32)
-        for key, value in low.items()
-    }
-    if not flat:
-        return spaces.Dict(boxes)
-    lows = np.concatenate(list(low.values())).astype(np.float32)
-    return spaces.Box(lows, np.ones_like(lows), dtype=np.float32)
+def _arranged(seen: Any, flat: bool) -> Any:
+    """Return observations (..., beams + 5) as they are or by name."""
+    parts = np.split(seen, (-5, -2), axis=-1)
+    return seen if flat else dict(zip(("scan", "goal", "velocity"), parts, strict=True))
+
+
+def _space(beams: int, flat: bool) -> spaces.Space[Any]:
+    low = _arranged(np.repeat(np.array((0.0, -1.0), dtype=np.float32), (beams + 1, 4)), flat)
+    if flat:
+        return spaces.Box(low, np.ones_like(low))
+    return spaces.Dict({key: spaces.Box(part, np.ones_like(part)) for key, part in low.items()})
