@@ -22,10 +22,11 @@ from stable_baselines3.common.vec_env import VecMonitor
 
 from antdrive.gym import NavigationEnv
 from antdrive.gym.sb3 import NavigationVecEnv
-from antdrive.runs.barn_challenge import OFFICIAL, PATHS, reference_times, unpacked
+from antdrive.runs.barn_challenge import OFFICIAL, WORLDS, reference_times, unpacked
 from antdrive.sim import measure
+from antdrive.worlds import Task, import_barn
 
-SEEDS, STEPS, ROBOTS = 10, 7_000_000, 64
+SEEDS, STEPS, ROBOTS = 10, 10_500_000, 64
 SHARED = {"noise": 1.0, "reach": 4.0, "flat": True}
 COLUMNS = ("world", "seed", "outcome", "certified", "score", "exact", "seconds", "contact", "clearance_m", "digest")
 torch.set_num_threads(1)  # more are slower for networks of this size
@@ -44,10 +45,10 @@ class Shown(BaseCallback):
         return float(np.mean(self.model.ep_success_buffer or [0.0]))
 
 
-def train(policy: Path) -> None:
+def train(policy: str) -> None:
     """Train a policy, and print the success that training reports."""
     robots = NavigationVecEnv(
-        ROBOTS, "barn", worlds=600, steps=400, reward={"progress": 0.5, "contact": -3.0}, **SHARED
+        ROBOTS, "barn", worlds=3000, steps=400, reward={"progress": 0.5, "contact": -4.0}, **SHARED
     )
     robots.seed(0)
     model = PPO(
@@ -60,25 +61,31 @@ def train(policy: Path) -> None:
     print(f"{shown.arrived:.1%} of the last 1,000 episodes arrived; {time.process_time() / 60:.1f} min of one core")
 
 
-def drive(policy: Path, barn: Path, drives: Path, plant: str = "bullet") -> None:
+def drive(policy: str, barn: str, drives: str, plant: str = "bullet") -> None:
     """Drive the policy in each world with each seed, a line each in a table; lines that are there are kept."""
     model = PPO.load(policy, device="cpu")
-    with tempfile.TemporaryDirectory() as folder:
-        fastest = reference_times(unpacked(barn, Path(folder), PATHS))
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = unpacked(Path(barn), Path(temporary))
+        fastest, tasks = reference_times(folder), sorted(map(import_barn, folder.rglob(WORLDS)), key=name_of)
     env = NavigationEnv("barn50", source=barn, plant=plant, steps=1000, rollouts=True, **SHARED)
-    done = {(row["world"], row["seed"]) for row in csv.DictReader(drives.open())} if drives.exists() else set()
-    with drives.open("a", newline="") as file:
-        table = csv.DictWriter(file, COLUMNS)
+    path = Path(drives)
+    done = {(row["world"], row["seed"]) for row in csv.DictReader(path.open())} if path.exists() else set()
+    with path.open("a", newline="") as file:
+        lines = csv.DictWriter(file, COLUMNS)
         if not done:
-            table.writeheader()
-        for task in env.tasks:
+            lines.writeheader()
+        for task in tasks:
             for seed in range(SEEDS):
                 if (task.world.name, str(seed)) not in done:
-                    table.writerow(driven(model, env, task, seed, fastest[task.world.name]))
+                    lines.writerow(driven(model, env, task, seed, fastest[task.world.name]))
                     file.flush()
 
 
-def driven(model: PPO, env: NavigationEnv, task: object, seed: int, fastest: float) -> dict[str, object]:
+def name_of(task: Task) -> tuple[int, str]:
+    return len(task.world.name), task.world.name
+
+
+def driven(model: PPO, env: NavigationEnv, task: Task, seed: int, fastest: float) -> dict[str, object]:
     """Drive one episode; return its line."""
     observation, info = env.reset(seed=seed, options={"world": task})
     over, clearance = False, info["clearance_m"]
@@ -96,9 +103,9 @@ def driven(model: PPO, env: NavigationEnv, task: object, seed: int, fastest: flo
     return line
 
 
-def table(drives: Path) -> None:
+def table(drives: str) -> None:
     """Print the drives' shares."""
-    rows = list(csv.DictReader(drives.open()))
+    rows = list(csv.DictReader(Path(drives).open()))
     arrived = [row for row in rows if row["outcome"] == "succeeded"]
     certified = [row for row in arrived if row["certified"] == "True"]
     print(f"{len(rows)} drives in {len({row['world'] for row in rows})} worlds")
@@ -111,4 +118,4 @@ def table(drives: Path) -> None:
 if __name__ == "__main__":
     COMMANDS = {"train": train, "drive": drive, "table": table}
     name, *arguments = sys.argv[1:]
-    COMMANDS[name](*(Path(one) if "." in one or "/" in one else one for one in arguments))
+    COMMANDS[name](*arguments)
