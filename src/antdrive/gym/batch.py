@@ -13,7 +13,7 @@ from antdrive.base.types import Flags, Floats
 from antdrive.gym import _kernels_batch as kernels
 from antdrive.robots import Lidar, RobotSpec
 from antdrive.robots.clearance import kernel_shape
-from antdrive.robots.noise import steady_errors
+from antdrive.robots.noise import fix_gains
 from antdrive.sim.log.outcome import Outcome
 from antdrive.worlds import Task, Trajectories
 
@@ -92,16 +92,15 @@ class KinematicPlant:
         levels = spec.noise.scaled(episode.noise)
         robots.state[i] = 0.0
         robots.state[i, :3] = robots.state[i, kernels.BELIEVED : kernels.BELIEVED + 3] = task.start
-        robots.random[i] = robots.digest[i] = np.uint64(_mixed(episode.seed))
+        robots.random[i] = robots.digest[i] = np.random.SeedSequence(episode.seed).generate_state(1, np.uint64)[0] | 1
         robots.tick[i] = robots.ending[i] = 0
         robots.pending[i] = 0.0
         if episode.key not in self._known:
             self._add(task)
         self.tasks[i], robots.world[i] = task, self._known.setdefault(episode.key, len(self._known))
         robots.goal[i] = (*task.goal, task.goal_tolerance)
-        errors = zip(steady_errors(levels, spec.track), (levels.pose_xy, levels.pose_yaw), strict=True)
-        gains = [(steady / fix) ** 2 if fix else 1.0 for steady, fix in errors]
-        robots.noise[i] = (levels.pose_xy, levels.pose_yaw, levels.encoder, levels.slip, *gains, episode.noise)
+        sizes = levels.pose_xy, levels.pose_yaw, levels.encoder, levels.slip
+        robots.noise[i] = (*sizes, *fix_gains(levels, spec.track), episode.noise)
         robots.timing[i] = round(levels.delay * CONTROL_HZ), max(1, round(CONTROL_HZ / levels.pose_rate))
         self._start(i, episode)
 
@@ -157,11 +156,3 @@ def _shared_spec(robot: RobotSpec, lidar: Lidar) -> Any:
         np.array((lidar.min_range, lidar.max_range, lidar.resolution, lidar.sigma)),
         np.array((CONTROL_HZ // ACTION_HZ, PHYSICS_HZ // CONTROL_HZ, CONTROL_HZ)),
     )
-
-
-def _mixed(seed: int) -> int:
-    """Return a seed of a kernel's random numbers, never 0: the splitmix64 hash of a whole number."""
-    value = (seed + 0x9E3779B97F4A7C15) % 2**64
-    value = (value ^ value >> 30) * 0xBF58476D1CE4E5B9 % 2**64
-    value = (value ^ value >> 27) * 0x94D049BB133111EB % 2**64
-    return (value ^ value >> 31) or 1
