@@ -69,7 +69,8 @@ def drive(policy: str, barn: str, drives: str, plant: str = "bullet") -> None:
         fastest, tasks = reference_times(folder), sorted(map(import_barn, folder.rglob(WORLDS)), key=name_of)
     env = NavigationEnv("barn50", source=barn, plant=plant, steps=1000, rollouts=True, **SHARED)
     path = Path(drives)
-    done = {(row["world"], row["seed"]) for row in csv.DictReader(path.open())} if path.exists() else set()
+    path.touch()
+    done = {(row["world"], row["seed"]) for row in csv.DictReader(path.read_text().splitlines())}
     with path.open("a", newline="") as file:
         lines = csv.DictWriter(file, COLUMNS)
         if not done:
@@ -105,7 +106,7 @@ def driven(model: PPO, env: NavigationEnv, task: Task, seed: int, fastest: float
 
 def table(drives: str) -> None:
     """Print the drives' shares."""
-    rows = list(csv.DictReader(Path(drives).open()))
+    rows = list(csv.DictReader(Path(drives).read_text().splitlines()))
     arrived = [row for row in rows if row["outcome"] == "succeeded"]
     certified = [row for row in arrived if row["certified"] == "True"]
     print(f"{len(rows)} drives in {len({row['world'] for row in rows})} worlds")

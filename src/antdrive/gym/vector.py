@@ -159,23 +159,26 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         chosen, robots = ~fresh, self._plant.robots
         np.clip(wanted, -1.0, 1.0, out=wanted)
         self._plant.drive(chosen, wanted)
-        for i in np.flatnonzero(fresh):
-            self._begin(int(i))
+        for i in np.flatnonzero(fresh).tolist():
+            self._begin(i)
         self._steps += chosen
         terminated = chosen & (robots.ending > 0)
         truncated = chosen & ~terminated & (self._steps >= self._limit)
         over = terminated | truncated
         self._over = over.copy()
-        terms = {key: np.where(chosen, value, 0.0) for key, value in self._terms(self._facts(wanted)).items()}
+        clearance, distance, progress = robots.facts.T
+        arrived, contact = robots.ending == 1, robots.ending > 2
+        facts = Facts(arrived, contact, progress, distance, clearance, robots.seen, wanted)
+        terms = {key: np.where(chosen, value, 0.0) for key, value in self._terms(facts).items()}
         rewards = np.sum(list(terms.values()), axis=0)
         info = self._info(np.ones(self.num_envs, dtype=np.bool_), over, truncated)
         info["reward_terms"] = _masked(terms, chosen)
         info["_reward_terms"] = chosen
         if over.any() and mode is AutoresetMode.SAME_STEP:
             final, last = np.full(self.num_envs, None, dtype=object), self._observation()
-            for i in np.flatnonzero(over):
+            for i in np.flatnonzero(over).tolist():
                 final[i] = last[i] if self._flat else {key: value[i] for key, value in last.items()}
-                self._begin(int(i))
+                self._begin(i)
             ended = {"final_obs": final, "_final_obs": over, "final_info": info, "_final_info": over.copy()}
             info = self._info(np.ones(self.num_envs, dtype=np.bool_)) | ended
         return self._observation(), rewards, terminated, truncated, info
@@ -232,12 +235,6 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         """Return what the robots observe, in new arrays."""
         return _arranged(self._plant.robots.seen.astype(np.float32), self._flat)
 
-    def _facts(self, actions: Floats) -> Facts:
-        robots = self._plant.robots
-        clearance, distance, progress = robots.facts.T
-        arrived, contact = robots.ending == 1, robots.ending > 2
-        return Facts(arrived, contact, progress, distance, clearance, robots.seen, actions)
-
     def _info(self, chosen: Flags, over: Flags | None = None, truncated: Flags | None = None) -> dict[str, Any]:
         """Return the facts of the chosen robots in new arrays with their masks; at the end of an episode its results, too."""
         robots = self._plant.robots
@@ -251,12 +248,11 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
             "outcome": KEYS[robots.ending if truncated is None else np.where(truncated, len(KEYS) - 1, robots.ending)],
         }
         info = _masked(values, chosen)
-        if over is not None and over.any():
-            for i in np.flatnonzero(over):
-                for key, value in self._plant.results(int(i)).items():
-                    if key not in self._hidden:
-                        info.setdefault(key, np.full(self.num_envs, None, dtype=object))[i] = value
-                        info[f"_{key}"] = over.copy()
+        for i in () if over is None else np.flatnonzero(over).tolist():
+            for key, value in self._plant.results(i).items():
+                if key not in self._hidden:
+                    info.setdefault(key, np.full(self.num_envs, None, dtype=object))[i] = value
+                    info[f"_{key}"] = over
         return info
 
 
