@@ -66,7 +66,7 @@ def drive(policy: str, barn: str, drives: str, plant: str = "bullet") -> None:
     model = PPO.load(policy, device="cpu")
     with tempfile.TemporaryDirectory() as temporary:
         folder = unpacked(Path(barn), Path(temporary))
-        fastest, tasks = reference_times(folder), sorted(map(import_barn, folder.rglob(WORLDS)), key=name_of)
+        fastest, tasks = reference_times(folder), [import_barn(path) for path in sorted(folder.rglob(WORLDS))]
     env = NavigationEnv("barn50", source=barn, plant=plant, steps=1000, rollouts=True, **SHARED)
     path = Path(drives)
     path.touch()
@@ -80,10 +80,6 @@ def drive(policy: str, barn: str, drives: str, plant: str = "bullet") -> None:
                 if (task.world.name, str(seed)) not in done:
                     lines.writerow(driven(model, env, task, seed, fastest[task.world.name]))
                     file.flush()
-
-
-def name_of(task: Task) -> tuple[int, str]:
-    return len(task.world.name), task.world.name
 
 
 def driven(model: PPO, env: NavigationEnv, task: Task, seed: int, fastest: float) -> dict[str, object]:
