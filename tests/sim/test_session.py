@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -48,6 +49,16 @@ def test_a_drive_commanded_from_outside_is_logged_and_certified(scenario, tmp_pa
     assert not certify(again).problems
     with pytest.raises((FieldError, InputError), match="Session"):
         rerun(again)
+
+
+def test_a_drive_commanded_from_outside_may_leave_its_route(scenario):
+    with Session(changed(scenario, "task.world", bounds=(-9.0, -9.0, 9.0, 9.0))) as drive:
+        while math.dist(drive.true_pose[:2], scenario.task.start[:2]) < 4.0:
+            drive.step(Twist(-min(drive.observe().tick / 300, 0.4), 0.0))
+    log = drive.rollout
+    assert certify(log).certified
+    record = dataclasses.replace(log.record, controller=dataclasses.replace(log.record.controller, name="PurePursuit"))
+    assert "off it" in " ".join(certify(dataclasses.replace(log, record=record)).problems)
 
 
 def test_the_true_pose_is_that_of_the_log(scenario):

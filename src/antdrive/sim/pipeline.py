@@ -28,7 +28,14 @@ from antdrive.sim.facts import Run as Run
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.contacts import attributed
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import ComponentRecord, DriveRecord, SmoothingRecord, TimesRecord, settings_of
+from antdrive.sim.log.record import (
+    FROM_OUTSIDE,
+    ComponentRecord,
+    DriveRecord,
+    SmoothingRecord,
+    TimesRecord,
+    settings_of,
+)
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import configuration_of, plan_record
@@ -155,7 +162,7 @@ class Session:
         s, mind, per_tick = self._scenario, self.mind, self._plant.per_tick
         guide, facts = mind.guide, configuration_of(s, self.grid, self.plan)
         if not self._by_itself:
-            facts["controller"] = ComponentRecord(name=Session.__name__, settings={})
+            facts["controller"] = ComponentRecord(name=FROM_OUTSIDE, settings={})
         drive_wall_s = time.perf_counter() - self._started
         record = DriveRecord(
             **facts,
