@@ -36,14 +36,7 @@ class Course(NamedTuple):
 
 
 def course_of(kind: str, robot: RobotSpec, worlds: int, source: Source | None, options: Mapping[str, Any]) -> Course:
-    """Return a course.
-
-    Args:
-        kind: a generator's name, `world`, or a name of `SETS`
-        robot: the robot, for which generated worlds have room
-        worlds: number of generated worlds
-        source: the world, or the set's file or folder
-        options: the generator's options
+    """Return a course by a generator's name with options, `world`, or a name of `SETS`; generated worlds have room for the robot.
 
     Raises:
         InputError: the course is unknown, its source is missing, not wanted or invalid, or there are no worlds.

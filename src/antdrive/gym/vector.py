@@ -204,7 +204,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         if task is None:
             raise ResetNeeded("call reset before render")
         if self._painters.get(i, (None, None))[0] is not task:
-            self._painters[i] = task, compositor_of(task, self._robot)
+            self._painters[i] = task, painter_of(task, self._robot)
         return self._painters[i][1].frame(plant.robots.state[i, :3], movers=plant.movers(i))
 
     def _begin(self, i: int, options: Mapping[str, Any] = MappingProxyType({})) -> None:
@@ -267,7 +267,7 @@ def plant_of(name: str) -> type[KinematicPlant]:
     return PhysicsPlant
 
 
-def compositor_of(task: Task, robot: RobotSpec) -> Any:
+def painter_of(task: Task, robot: RobotSpec) -> Any:
     """Return the films' compositor of a task without a plan."""
     from antdrive.views.film.camera import camera_for
     from antdrive.views.film.compositor import Compositor, drawn_height
