@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 
-from antdrive import sim
 from antdrive.worlds import Disc, Task, World
 from benchmarks.markdown import command_line, missing, print_table
 
@@ -173,9 +172,8 @@ def main() -> None:
         f"kinematic batch of {o.robots}": (batch(o.robots, 0.0), o.robots, o.steps),
         f"kinematic batch of {o.robots}, noise 1": (batch(o.robots, 1.0), o.robots, o.steps),
         "one kinematic environment": (alone("kinematic"), 1, 10 * o.steps),
+        "one environment in physics": (alone("bullet"), 1, 3 * o.steps),
     }
-    if hasattr(sim, "Session"):
-        steppers["one environment in physics"] = alone("bullet"), 1, 3 * o.steps
     other = ir_sim(few)
     if other is not None:
         steppers[f"ir-sim, {few} robots"] = other, few, max(o.steps // 10, 1)

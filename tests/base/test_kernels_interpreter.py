@@ -204,7 +204,7 @@ from antdrive.base import _kernels_dispatcher, kernel_cache
 from antdrive.base._kernels_interpreter import interpret
 from antdrive.planners import PLANNERS
 from antdrive.sim import Scenario, run
-from antdrive.views import warming
+from antdrive.cli import warming
 
 calls, kinds = {}, set()
 

@@ -75,8 +75,8 @@ def compiled(monkeypatch):
         progress(1.0)
         done.append("all")
 
-    monkeypatch.setattr("antdrive.views.warming.warm", warm)
-    monkeypatch.setattr("antdrive.views.warming.is_warm", lambda: bool(done))
+    monkeypatch.setattr("antdrive.cli.warming.warm", warm)
+    monkeypatch.setattr("antdrive.cli.warming.is_warm", lambda: bool(done))
     return done
 
 

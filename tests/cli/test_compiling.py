@@ -10,8 +10,8 @@ from antdrive.base import kernel_cache
 from antdrive.base.kernel_cache import COMPILING
 from antdrive.base.progress import bar
 from antdrive.cli.console import report_compiling
+from antdrive.cli.warming import plan_with
 from antdrive.planners import PLANNERS
-from antdrive.views.warming import plan_with
 
 
 @pytest.fixture(autouse=True)

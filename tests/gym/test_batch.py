@@ -8,10 +8,12 @@ import pytest
 
 pytest.importorskip("gymnasium", reason="needs the extra `gym`")
 
+from antdrive.cli import warming
 from antdrive.gym import _kernels_batch as kernels
 from antdrive.gym.batch import CONTROL_HZ, ENDINGS, PHYSICS_HZ, Episode, KinematicPlant, thinned
 from antdrive.robots import Footprint, footprint_clearance, load_robot
 from antdrive.robots.noise import SLIP_TIME
+from antdrive.runs.pool import Pool
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, generate
@@ -200,6 +202,15 @@ def test_worlds_that_come_later_change_no_other():
             plant.drive(chosen, np.array([action, action]))
     assert alone.results(0) == both.results(0)
     assert both.robots.tick.tolist()[1] == 0
+
+
+def test_warm_compiles_the_batch(monkeypatch, tmp_path):
+    works = []
+    monkeypatch.setattr(Pool, "results", lambda _, __, items, **___: works.extend(items) or ())
+    monkeypatch.setattr(warming, "_marker", lambda: tmp_path / "warm")
+    warming.warm(1)
+    assert warming.drive_batch in works
+    warming.drive_batch()
 
 
 def test_constants_are_those_of_the_rules_that_they_repeat():

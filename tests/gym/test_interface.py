@@ -17,6 +17,7 @@ from antdrive.gym.env import NavigationEnv  # noqa: E402
 from antdrive.gym.vector import NavigationVectorEnv  # noqa: E402
 from antdrive.robots import load_robot  # noqa: E402
 from antdrive.worlds import Disc, Task, World  # noqa: E402
+from antdrive.worlds.generators.generate import BARN_FILLS, BARN_ROUNDS  # noqa: E402
 from tools.shared_data import BARN, DYNABARN  # noqa: E402
 
 NEEDS = {"antdrive/Barn50-v0": BARN, "antdrive/DynaBarn-v0": DYNABARN}
@@ -168,13 +169,34 @@ def test_reset_takes_a_world_a_start_a_goal_and_noise():
 
 def test_generated_worlds_have_the_options_that_are_given():
     env = NavigationEnv("forest", options={"count": 3, "radius": (0.2, 0.3)}, worlds=2)
-    for seed in range(4):
-        env.reset(seed=seed)
-    radii = [[disc.radius for disc in task.world.obstacles] for task in env._batch._tasks.values()]
+    radii = [[disc.radius for disc in env._batch._course.task(number).world.obstacles] for number in (0, 1)]
     assert [len(one) for one in radii] == [3, 3]
     assert all(0.2 <= radius <= 0.3 for one in radii for radius in one)
     with pytest.raises(InputError, match="forest: cuont: unknown option"):
         NavigationEnv("forest", options={"cuont": 3}).reset()
+
+
+def test_generated_barn_worlds_mix_the_fill_ratios_and_rounds_of_the_set():
+    course = NavigationEnv("barn")._batch._course
+    sources = {course.task(number).world.source.partition("fill ")[2].partition(";")[0] for number in range(12)}
+    assert sources == {f"{fill:g}, {rounds} rounds" for fill in BARN_FILLS for rounds in BARN_ROUNDS}
+
+
+def outlines(course, numbers):
+    """The cylinders of a course's worlds, to a centimetre, wherever the world lies and whichever way the list goes."""
+    for number in numbers:
+        discs = course.task(number).world.discs
+        yield frozenset(map(tuple, np.rint(100 * (discs - discs.min(axis=0))).astype(int).tolist()))
+
+
+@pytest.mark.parametrize("worlds", [24, pytest.param(1000, marks=pytest.mark.slow)])
+def test_training_draws_no_world_of_the_fifty_for_evaluation(worlds):
+    kept = set(outlines(made("antdrive/Barn50-v0")._batch._course, range(50)))
+    assert len(kept) == 50
+    for name in ("forest", "barn", "office"):
+        course = NavigationEnv(name)._batch._course
+        assert course.worlds == 1000  # by default
+        assert kept.isdisjoint(outlines(course, range(worlds)))
 
 
 def test_a_picture_shows_where_the_robot_is():
@@ -200,6 +222,7 @@ def test_a_function_replaces_the_reward():
     [
         ({"course": "woods"}, "course: unknown 'woods'; choose from forest, barn, office, world, barn50, dynabarn"),
         ({"course": "barn50"}, "source: missing; name the folder or archive of the BARN challenge's"),
+        ({"course": "barn", "source": BARN}, "source: barn has generated worlds alone; omit it, or take World-v0"),
         ({"robot": NO_LIDAR}, "robot: jackal has no lidar; add one to its file, or drive jackal or turtlebot4"),
         ({"plant": "real"}, "plant: unknown 'real'; choose kinematic or bullet"),
         ({"noise": -1}, "noise: -1 times the robot's own is too much"),

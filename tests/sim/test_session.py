@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -48,6 +49,27 @@ def test_a_drive_commanded_from_outside_is_logged_and_certified(scenario, tmp_pa
     assert not certify(again).problems
     with pytest.raises((FieldError, InputError), match="Session"):
         rerun(again)
+
+
+def test_a_drive_commanded_from_outside_may_leave_its_route(scenario):
+    with Session(changed(scenario, "task.world", bounds=(-9.0, -9.0, 9.0, 9.0))) as drive:
+        while math.dist(drive.true_pose[:2], scenario.task.start[:2]) < 4.0:
+            drive.step(Twist(-min(drive.observe().tick / 300, 0.4), 0.0))
+    log = drive.rollout
+    assert certify(log).certified
+    record = dataclasses.replace(log.record, controller=dataclasses.replace(log.record.controller, name="PurePursuit"))
+    assert "off it" in " ".join(certify(dataclasses.replace(log, record=record)).problems)
+
+
+def test_the_true_pose_is_that_of_the_log(scenario):
+    with Session(scenario) as drive:
+        poses = [drive.true_pose]
+        for _ in range(3):
+            drive.step(Twist(0.3, 0.1))
+            poses.append(drive.true_pose)
+    assert [tuple(pose) for pose in drive.rollout.pose[::4].tolist()] == poses
+    with pytest.raises(FieldError, match="true_pose: there is no drive"):
+        _ = Session(scenario).true_pose
 
 
 def test_a_session_that_is_left_early_has_an_honest_log(scenario):

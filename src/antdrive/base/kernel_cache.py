@@ -18,7 +18,7 @@ from pathlib import Path
 _ROOT = Path(__file__).parent.parent  # the package antdrive
 _IMPORT = re.compile(rb"^[ \t]*(?:from|import)\b[^\n(]*(?:\([^)]*\))?", re.MULTILINE)
 _NAME = re.compile(rb"\b_kernels\w*")
-PACKAGES = ("base", "worlds", "planners", "robots", "sim", "views")
+PACKAGES = ("base", "worlds", "planners", "robots", "sim", "views", "gym")
 
 
 def ignore(name: str) -> None:

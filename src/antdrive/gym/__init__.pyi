@@ -1,4 +1,5 @@
 from .env import NavigationEnv as NavigationEnv
+from .rewards import WEIGHTS as WEIGHTS
 from .rewards import Facts as Facts
 from .vector import NavigationVectorEnv as NavigationVectorEnv
 

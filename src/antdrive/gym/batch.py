@@ -13,7 +13,7 @@ from antdrive.base.types import Flags, Floats
 from antdrive.gym import _kernels_batch as kernels
 from antdrive.robots import Lidar, RobotSpec
 from antdrive.robots.clearance import kernel_shape
-from antdrive.robots.noise import steady_errors
+from antdrive.robots.noise import fix_gains
 from antdrive.sim.log.outcome import Outcome
 from antdrive.worlds import Task, Trajectories
 
@@ -21,14 +21,7 @@ ACTION_HZ, CONTROL_HZ, PHYSICS_HZ = 10, 60, 240
 SCAN_RATE = ACTION_HZ * (1 + 1e-6)  # due at each action, whatever the rounding [Hz]
 MOST_DELAY = CONTROL_HZ  # control periods in the longest delay that `Noise` allows
 #: How an episode ended, by the kernels' number; None while it goes on.
-ENDINGS = (
-    None,
-    Outcome.SUCCEEDED,
-    Outcome.STUCK,
-    Outcome.COLLIDED,
-    Outcome.HIT_WHILE_STANDING,
-    Outcome.HIT_BY_TELEPORT,
-)
+ENDINGS = (None, *map(Outcome.__getitem__, ("SUCCEEDED", "STUCK", "COLLIDED", "HIT_WHILE_STANDING", "HIT_BY_TELEPORT")))
 
 
 class Episode(NamedTuple):
@@ -99,16 +92,15 @@ class KinematicPlant:
         levels = spec.noise.scaled(episode.noise)
         robots.state[i] = 0.0
         robots.state[i, :3] = robots.state[i, kernels.BELIEVED : kernels.BELIEVED + 3] = task.start
-        robots.random[i] = robots.digest[i] = np.uint64(_mixed(episode.seed))
+        robots.random[i] = robots.digest[i] = np.random.SeedSequence(episode.seed).generate_state(1, np.uint64)[0] | 1
         robots.tick[i] = robots.ending[i] = 0
         robots.pending[i] = 0.0
         if episode.key not in self._known:
             self._add(task)
         self.tasks[i], robots.world[i] = task, self._known.setdefault(episode.key, len(self._known))
         robots.goal[i] = (*task.goal, task.goal_tolerance)
-        errors = zip(steady_errors(levels, spec.track), (levels.pose_xy, levels.pose_yaw), strict=True)
-        gains = [(steady / fix) ** 2 if fix else 1.0 for steady, fix in errors]
-        robots.noise[i] = (levels.pose_xy, levels.pose_yaw, levels.encoder, levels.slip, *gains, episode.noise)
+        sizes = levels.pose_xy, levels.pose_yaw, levels.encoder, levels.slip
+        robots.noise[i] = (*sizes, *fix_gains(levels, spec.track), episode.noise)
         robots.timing[i] = round(levels.delay * CONTROL_HZ), max(1, round(CONTROL_HZ / levels.pose_rate))
         self._start(i, episode)
 
@@ -135,21 +127,21 @@ class KinematicPlant:
 
     def _add(self, task: Task) -> None:
         """Add a task's world to the maps."""
-        world, maps, eye = task.world, self._maps, self._eye
+        world, maps, movers = task.world, self._maps, Trajectories.of(task.world, task.start[:2])
         discs, heights = world.discs, np.array([disc.height for disc in world.obstacles])
-        visible = discs[heights >= eye] if len(discs) else discs
-        movers = Trajectories.of(world, task.start[:2])
-        radii = np.where(movers.heights >= eye, movers.radii, -movers.radii) if len(movers) else np.empty(0)
+        visible = discs[heights >= self._eye]
+        radii = np.where(movers.heights >= self._eye, movers.radii, -movers.radii)
         tracks = movers.positions(np.arange(self._periods if len(movers) else 0) / CONTROL_HZ)
-        parts = (discs.ravel(), visible.T.ravel(), radii, tracks.ravel())
-        old = (maps.discs, maps.visible, maps.radii, maps.tracks)
-        first, seen, mover, track = map(len, old)
-        row = (first, len(discs), seen, len(visible), mover, len(radii), track)
-        self._maps = kernels.Maps(
-            np.vstack((maps.rows, row)),
-            np.vstack((maps.bounds, world.bounds)),
-            *map(np.concatenate, zip(old, parts, strict=True)),
+        row = (len(maps.discs), len(discs), len(maps.visible), len(visible), len(maps.radii), len(radii))
+        parts: Any = (
+            [[*row, len(maps.tracks)]],
+            [world.bounds],
+            discs.ravel(),
+            visible.T.ravel(),
+            radii,
+            tracks.ravel(),
         )
+        self._maps = kernels.Maps(*(np.concatenate(pair) for pair in zip(maps, parts, strict=True)))
 
 
 def _shared_spec(robot: RobotSpec, lidar: Lidar) -> Any:
@@ -164,11 +156,3 @@ def _shared_spec(robot: RobotSpec, lidar: Lidar) -> Any:
         np.array((lidar.min_range, lidar.max_range, lidar.resolution, lidar.sigma)),
         np.array((CONTROL_HZ // ACTION_HZ, PHYSICS_HZ // CONTROL_HZ, CONTROL_HZ)),
     )
-
-
-def _mixed(seed: int) -> int:
-    """Return a seed of a kernel's random numbers, never 0: the splitmix64 hash of a whole number."""
-    value = (seed + 0x9E3779B97F4A7C15) % 2**64
-    value = (value ^ value >> 30) * 0xBF58476D1CE4E5B9 % 2**64
-    value = (value ^ value >> 27) * 0x94D049BB133111EB % 2**64
-    return (value ^ value >> 31) or 1

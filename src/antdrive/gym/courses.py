@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import itertools
 import os
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from antdrive.base.caches import cached
 from antdrive.base.errors import FieldError, InputError
 from antdrive.robots import RobotSpec, overlap_at
 from antdrive.runs.barn_challenge import WORLDS, unpacked
 from antdrive.worlds import Task, Wandering, import_barn, import_dynabarn, load_task
-from antdrive.worlds.generators.generate import GENERATORS, generated
+from antdrive.worlds.generators.generate import BARN_FILLS, BARN_ROUNDS, GENERATORS, generated
 
 Source: TypeAlias = str | os.PathLike[str] | Task
+#: Fill ratios and smoothing rounds of generated BARN-like worlds, in turn; as often in the set's 300 worlds.
+BARN_MIX = tuple({"fill": fill, "rounds": rounds} for fill, rounds in itertools.product(BARN_FILLS, BARN_ROUNDS))
 #: Sets of third-party worlds: what `source` must name.
 SETS = {
     "barn50": "the folder or archive of the BARN challenge's world_N.world files",
@@ -26,45 +28,43 @@ SETS = {
 }
 
 
-@dataclass(frozen=True)
-class Course:
+class Course(NamedTuple):
     """Numbered tasks."""
 
-    count: int  # how many there are
+    worlds: int  # how many there are
     task: Callable[[int], Task]  # the task of a number from 0
 
 
-def course_of(
-    kind: str, robot: RobotSpec, worlds: int, source: Source | None, options: Mapping[str, Any] = MappingProxyType({})
-) -> Course:
-    """Return a course.
-
-    Args:
-        kind: a generator's name, `world`, or a name of `SETS`
-        robot: the robot, for which generated worlds have room
-        worlds: number of generated worlds
-        source: the world, or the set's file or folder
-        options: the generator's options
+def course_of(kind: str, robot: RobotSpec, worlds: int, source: Source | None, options: Mapping[str, Any]) -> Course:
+    """Return a course by a generator's name with options, `world`, or a name of `SETS`; generated worlds have room for the robot.
 
     Raises:
-        InputError: the course is unknown, its source is missing or invalid, or there are no worlds.
+        InputError: the course is unknown, its source is missing, not wanted or invalid, or there are no worlds.
     """
+    if kind not in (*GENERATORS, "world", *SETS):
+        raise InputError(f"course: unknown {kind!r}; choose from {', '.join((*GENERATORS, 'world', *SETS))}")
     if kind in GENERATORS:
+        if source is not None:
+            raise InputError(f"source: {kind} has generated worlds alone; omit it, or take World-v0 or Barn50-v0")
         if worlds < 1:
             raise InputError(f"worlds: must be at least 1, got {worlds}")
-        room = {} if kind == "office" else {"robot_radius": round(robot.radius + 0.03, 3)}
-        given = {**room, **options}.items()
-        texts = tuple((key, ",".join(map(str, v)) if isinstance(v, tuple | list) else str(v)) for key, v in given)
-        return Course(worlds, lambda number: generated(kind, number, texts))
-    if kind == "world":
-        task = task_of("forest" if source is None else source)
-        return Course(1, lambda number: task)
-    if kind not in SETS:
-        raise InputError(f"course: unknown {kind!r}; choose from {', '.join((*GENERATORS, 'world', *SETS))}")
-    if source is None or isinstance(source, Task):
+        tasks: Callable[[int], Task] = functools.partial(_generated, kind, robot, options)
+    elif kind == "world":
+        worlds, task = 1, task_of("forest" if source is None else source)
+        tasks = (task,).__getitem__
+    elif source is None or isinstance(source, Task):
         raise InputError(f"source: missing; name {SETS[kind]} (docs/how-to/data.md says where to get it)")
-    tasks = _barn(os.fspath(source)) if kind == "barn50" else tuple(import_dynabarn(source))
-    return Course(len(tasks), tasks.__getitem__)
+    else:
+        known = _barn(os.fspath(source)) if kind == "barn50" else tuple(import_dynabarn(source))
+        worlds, tasks = len(known), known.__getitem__
+    return Course(worlds, functools.cache(lambda number: task_of(repeated(tasks(number), number), robot)))
+
+
+def _generated(kind: str, robot: RobotSpec, options: Mapping[str, Any], number: int) -> Task:
+    given: dict[str, Any] = {} if kind == "office" else {"robot_radius": round(robot.radius + 0.03, 3)}
+    given |= (BARN_MIX[number % len(BARN_MIX)] if kind == "barn" else {}) | dict(options)
+    texts = ((key, ",".join(map(str, v)) if isinstance(v, tuple | list) else str(v)) for key, v in given.items())
+    return generated(kind, number, tuple(texts))
 
 
 def task_of(world: Source, robot: RobotSpec | None = None, **ends: Any) -> Task:
@@ -75,7 +75,7 @@ def task_of(world: Source, robot: RobotSpec | None = None, **ends: Any) -> Task:
     """
     task = world if isinstance(world, Task) else load_task(world)
     try:
-        given: dict[str, Any] = {key: tuple(map(float, value)) for key, value in ends.items() if value is not None}
+        given: dict[str, Any] = {key: tuple(map(float, value)) for key, value in ends.items()}
         for key, value in given.items():
             if len(value) != (3 if key == "start" else 2):
                 raise FieldError(key, f"must be {'x, y and yaw' if key == 'start' else 'x and y'}, got {value}")
@@ -93,14 +93,11 @@ def task_of(world: Source, robot: RobotSpec | None = None, **ends: Any) -> Task:
 def repeated(task: Task, number: int) -> Task:
     """Return a task whose wandering movers have seeds, made from its number: each of its episodes has the same movers."""
     movers = tuple(
-        dataclasses.replace(mover, seed=1000 * number + i)
-        if isinstance(mover, Wandering) and mover.seed is None
-        else mover
-        for i, mover in enumerate(task.world.movers)
+        dataclasses.replace(one, seed=1000 * number + i) if isinstance(one, Wandering) and one.seed is None else one
+        for i, one in enumerate(task.world.movers)
     )
-    if movers == task.world.movers:
-        return task
-    return dataclasses.replace(task, world=dataclasses.replace(task.world, movers=movers))
+    world = task.world if movers == task.world.movers else dataclasses.replace(task.world, movers=movers)
+    return dataclasses.replace(task, world=world)
 
 
 @cached(4)

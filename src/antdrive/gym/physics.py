@@ -6,57 +6,35 @@ from typing import Any
 
 import numpy as np
 
-from antdrive import sim
 from antdrive.base.errors import InputError
 from antdrive.base.types import Flags, Floats
 from antdrive.gym import _kernels_batch as kernels
 from antdrive.gym.batch import ACTION_HZ, CONTROL_HZ, ENDINGS, PHYSICS_HZ, Episode, KinematicPlant
-from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec, Twist
-
-
-def open_session(scenario: sim.Scenario) -> Any:
-    """Return a drive in physics that is commanded from outside.
-
-    Raises:
-        InputError: this version has no such drives, or the planner finds no path.
-    """
-    session = getattr(sim, "Session", None)
-    if session is None:
-        raise InputError("plant: bullet needs antdrive.Session, which this version lacks; use kinematic")
-    drive = session(scenario)
-    if drive.path is None:
-        where = f"in {scenario.task.world.name}, seed {scenario.seed}"
-        raise InputError(f"plant: bullet needs a path for its log, but {where}: {drive.plan.reason or 'no path'}")
-    return drive.__enter__()
+from antdrive.sim import Perception, Scenario, Session, certify
 
 
 class PhysicsPlant(KinematicPlant):
-    """Robots in physics, one after the other; `make_vec(..., vectorization_mode="async")` uses a process for each."""
+    """Robots in physics, one after the other; `make_vec(..., vectorization_mode="async")` uses a process for each.
+
+    The policy gets no path. The log has that of `astar` with margin 0, to which its length is compared; a world without one is
+    refused.
+    """
 
     def __init__(self, robot: RobotSpec, number: int, steps: int) -> None:
         super().__init__(robot, number, steps)
-        self._limit = steps / ACTION_HZ
-        self._drives, self._results = dict[int, Any](), dict[int, dict[str, Any]]()
+        rates = {"control_hz": CONTROL_HZ, "physics_hz": PHYSICS_HZ, "time_limit": steps / ACTION_HZ}
+        self._settings: dict[str, Any] = {"margin": 0.0, "perception": Perception(kind="lidar"), **rates}
+        self._drives, self._results = dict[int, Session](), dict[int, dict[str, Any]]()
 
     def _start(self, i: int, episode: Episode) -> None:
         self.leave(i)
         self.robots.ending[i] = 0
-        self._drives[i] = open_session(
-            sim.Scenario(
-                task=episode.task,
-                planner=load_planner("astar"),
-                planner_name="astar",
-                robot=self._spec,
-                seed=episode.seed,
-                noise=episode.noise,
-                margin=0.0,
-                perception=sim.Perception(kind="lidar"),
-                control_hz=CONTROL_HZ,
-                physics_hz=PHYSICS_HZ,
-                time_limit=self._limit,
-            )
-        )
+        task, (_, _, seed, noise) = episode.task, episode
+        drive = Session(Scenario.of(task, "astar", self._spec, seed=seed, noise=noise, **self._settings))
+        if drive.path is None:
+            raise InputError(f"plant: bullet needs a path for its log, but in {task.world.name}: {drive.plan.reason}")
+        self._drives[i] = drive.__enter__()
         self._observe(i)
         self._note(i)
 
@@ -70,7 +48,7 @@ class PhysicsPlant(KinematicPlant):
                 drive.step(Twist(*robots.state[i, kernels.TO_SPEED : kernels.TO_TURN + 1].tolist()))
                 if not drive.ended:
                     self._observe(i)
-                    if self._arrived(i):
+                    if kernels.arrived(i, robots) != kernels.DRIVING:
                         drive.step(None)  # the referee judges where it stands
                 if drive.ended:
                     break
@@ -81,15 +59,16 @@ class PhysicsPlant(KinematicPlant):
 
     def leave(self, i: int) -> None:
         """End robot i's drive, if it has one, and keep its results."""
-        drive = self._drives.pop(i, None)
+        drive, robots = self._drives.pop(i, None), self.robots
         if drive is None:
             return
         drive.__exit__(None, None, None)
-        log, robots = drive.rollout, self.robots
+        log = drive.rollout
+        assert log is not None  # there is a path
         robots.ending[i] = ENDINGS.index(log.outcome) if log.outcome in ENDINGS else 0
         if log.outcome.with_contact:
             robots.facts[i, kernels.CLEARANCE] = min(robots.facts[i, kernels.CLEARANCE], 0.0)
-        self._results[i] = {"digest": log.digest, "certificate": sim.certify(log), "rollout": log}
+        self._results[i] = {"digest": log.digest, "certificate": certify(log), "rollout": log}
 
     def results(self, i: int) -> dict[str, Any]:
         """Return the log of an episode that has ended, its digest and its certificate."""
@@ -107,12 +86,8 @@ class PhysicsPlant(KinematicPlant):
         for k, command in enumerate(now.pending):
             robots.pending[i, (now.tick + k) % len(now.pending)] = command
 
-    def _arrived(self, i: int) -> bool:
-        """Return whether robot i stands at the goal by its estimate."""
-        return kernels.arrived(i, self.robots) != kernels.DRIVING
-
     def _note(self, i: int) -> None:
         """Write the observation of robot i, and what is true, for rewards and infos alone."""
         kernels.see(i, self._shared, self.robots)
-        self.robots.state[i, :3] = self._drives[i]._plant.state.pose
+        self.robots.state[i, :3] = self._drives[i].true_pose
         kernels.note(i, self._shared, self.robots, self._maps)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -19,7 +19,7 @@ WEIGHTS = MappingProxyType({"goal": 4.0, "contact": -5.0, "progress": 0.25, "ste
 
 
 class Facts(NamedTuple):
-    """What happened to each robot in an action; what is true, not what the robot knows.
+    """What happened to each of N robots in an action; what is true, not what the robot knows.
 
     Attributes:
         arrived: whether it stopped at the goal (N,)
@@ -59,14 +59,14 @@ def terms_of(rule: Rule) -> Callable[[Facts], dict[str, Floats]]:
             raise InputError(f"reward: unknown weight {key!r}; {suggest(str(key), WEIGHTS)}")
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(f"reward: {key}: must be a finite number, got {value!r:.60}")
-    weights = WEIGHTS | dict(rule)
-    return lambda facts: {
-        "goal": weights["goal"] * facts.arrived,
-        "contact": weights["contact"] * facts.contact,
-        "progress": weights["progress"] * facts.progress,
-        "step": np.full(len(facts.progress), weights["step"]),
-        "near": weights["near"] * (facts.clearance < NEAR),
-    }
+    weights: dict[str, float] = WEIGHTS | dict(rule)
+
+    def terms(facts: Facts) -> dict[str, Floats]:
+        near, each = facts.clearance < NEAR, np.ones(len(facts.progress))
+        parts: Any = (facts.arrived, facts.contact, facts.progress, each, near)
+        return {key: weight * part for (key, weight), part in zip(weights.items(), parts, strict=True)}
+
+    return terms
 
 
 def _checked(rewards: Floats, number: int) -> Floats:

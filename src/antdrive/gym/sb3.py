@@ -59,13 +59,11 @@ class NavigationVecEnv(_vec_env.VecEnv):  # type: ignore[misc,name-defined]  # s
         """Return an attribute, equal for all robots."""
         return [getattr(self.batch, attr_name)] * len(self._chosen(indices))
 
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+    def set_attr(self, attr_name: str, *args: Any, **kwargs: Any) -> Any:
         """Refuse: the robots share one batch."""
-        raise InputError(f"{attr_name}: give it to NavigationVecEnv; the robots share one batch")
+        raise InputError(f"{attr_name}: give it to NavigationVecEnv or call it on `batch`, which all robots share")
 
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Refuse: the robots share one batch."""
-        raise InputError(f"{method_name}: call it on `batch`; the robots share one batch")
+    env_method = set_attr
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Return that no robot has a wrapper of its own."""

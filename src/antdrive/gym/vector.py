@@ -93,16 +93,15 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         self.num_envs, self.render_mode = num_envs, render_mode
         self._robot = thinned(robot if isinstance(robot, RobotSpec) else load_robot(robot), beams, reach)
         self._course = course_of(course, self._robot, worlds, source, options)
-        self._noise, self._limit, self._flat, self._beams = self._factor(noise), steps, flat, beams
+        self._noise, self._limit, self._flat = self._factor(noise), steps, flat
         self._terms = terms_of(reward)
         self._hidden = () if rollouts else ("rollout",)
         self._plant = plant_of(plant)(self._robot, num_envs, steps)
-        self._tasks: dict[int, Task] = {}
-        self.rngs = list[np.random.Generator]()  # one for each robot
+        self.rngs: list[np.random.Generator | None] = [None] * num_envs
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._over = np.ones(num_envs, dtype=np.bool_)
         self._painters: dict[int, tuple[Task, Any]] = {}  # of each robot
-        self.single_observation_space = _observations(beams, flat)
+        self.single_observation_space = _space(beams, flat)
         self.single_action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -127,18 +126,12 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         chosen = np.array(options.get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
         if chosen.shape != (self.num_envs,) or chosen.dtype != np.bool_:
             raise InputError(f"options: reset_mask must be {self.num_envs} booleans")
-        seeds = (
-            [None if seed is None else seed + i for i in range(self.num_envs)]
-            if not isinstance(seed, Sequence)
-            else seed
-        )
+        count = self.num_envs
+        seeds = seed if isinstance(seed, Sequence) else [None if seed is None else seed + i for i in range(count)]
         if len(seeds) != self.num_envs:
             raise InputError(f"seed: must be one for each of {self.num_envs} robots, got {len(seeds)}")
-        fresh = not self.rngs
         for i in range(self.num_envs):
-            if fresh:
-                self.rngs.append(seeding.np_random(seeds[i])[0])
-            elif seeds[i] is not None and chosen[i]:
+            if self.rngs[i] is None or (seeds[i] is not None and chosen[i]):
                 self.rngs[i] = seeding.np_random(seeds[i])[0]
             if chosen[i]:
                 self._begin(i, options)
@@ -161,28 +154,31 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         if wanted.shape != (self.num_envs, 2) or not np.isfinite(wanted).all():
             raise InputError(f"actions: must be finite numbers of shape ({self.num_envs}, 2), got {actions!r:.100}")
         mode, fresh = self.metadata["autoreset_mode"], self._over
-        if not self.rngs or (mode is AutoresetMode.DISABLED and fresh.any()):
+        if self.rngs[0] is None or (mode is AutoresetMode.DISABLED and fresh.any()):
             raise ResetNeeded("call reset first: an episode has ended")
         chosen, robots = ~fresh, self._plant.robots
         np.clip(wanted, -1.0, 1.0, out=wanted)
         self._plant.drive(chosen, wanted)
-        for i in np.flatnonzero(fresh):
-            self._begin(int(i))
+        for i in np.flatnonzero(fresh).tolist():
+            self._begin(i)
         self._steps += chosen
         terminated = chosen & (robots.ending > 0)
         truncated = chosen & ~terminated & (self._steps >= self._limit)
         over = terminated | truncated
         self._over = over.copy()
-        terms = {key: np.where(chosen, value, 0.0) for key, value in self._terms(self._facts(wanted)).items()}
+        clearance, distance, progress = robots.facts.T
+        arrived, contact = robots.ending == 1, robots.ending > 2
+        facts = Facts(arrived, contact, progress, distance, clearance, robots.seen, wanted)
+        terms = {key: np.where(chosen, value, 0.0) for key, value in self._terms(facts).items()}
         rewards = np.sum(list(terms.values()), axis=0)
         info = self._info(np.ones(self.num_envs, dtype=np.bool_), over, truncated)
         info["reward_terms"] = _masked(terms, chosen)
         info["_reward_terms"] = chosen
         if over.any() and mode is AutoresetMode.SAME_STEP:
             final, last = np.full(self.num_envs, None, dtype=object), self._observation()
-            for i in np.flatnonzero(over):
+            for i in np.flatnonzero(over).tolist():
                 final[i] = last[i] if self._flat else {key: value[i] for key, value in last.items()}
-                self._begin(int(i))
+                self._begin(i)
             ended = {"final_obs": final, "_final_obs": over, "final_info": info, "_final_info": over.copy()}
             info = self._info(np.ones(self.num_envs, dtype=np.bool_)) | ended
         return self._observation(), rewards, terminated, truncated, info
@@ -208,17 +204,17 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         if task is None:
             raise ResetNeeded("call reset before render")
         if self._painters.get(i, (None, None))[0] is not task:
-            self._painters[i] = task, compositor_of(task, self._robot)
+            self._painters[i] = task, painter_of(task, self._robot)
         return self._painters[i][1].frame(plant.robots.state[i, :3], movers=plant.movers(i))
 
     def _begin(self, i: int, options: Mapping[str, Any] = MappingProxyType({})) -> None:
         """Put robot i at the start of its next episode."""
-        number, seed = int(self.rngs[i].integers(self._course.count)), int(self.rngs[i].integers(2**32))
-        world, ends = options.get("world"), {key: options.get(key) for key in ("start", "goal")}
-        if world is None and number not in self._tasks:
-            self._tasks[number] = task_of(repeated(self._course.task(number), number), self._robot)
-        task = self._tasks[number] if world is None else repeated(task_of(world), 0)
-        if world is not None or any(end is not None for end in ends.values()):
+        rng, world = self.rngs[i], options.get("world")
+        assert rng is not None  # `reset` made it
+        number, seed = int(rng.integers(self._course.worlds)), int(rng.integers(2**32))
+        task = self._course.task(number) if world is None else repeated(task_of(world), 0)
+        ends = {key: options[key] for key in ("start", "goal") if options.get(key) is not None}
+        if world is not None or ends:
             task = task_of(task, self._robot, **ends)
         key = number if world is None else task.world, task.start if task.world.movers else None
         noise = self._noise if options.get("noise") is None else self._factor(options["noise"])
@@ -237,20 +233,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _observation(self) -> Any:
         """Return what the robots observe, in new arrays."""
-        seen, beams = self._plant.robots.seen.astype(np.float32), self._beams
-        if self._flat:
-            return seen
-        return {
-            "scan": seen[:, :beams].copy(),
-            "goal": seen[:, beams : beams + 3].copy(),
-            "velocity": seen[:, beams + 3 :].copy(),
-        }
-
-    def _facts(self, actions: Floats) -> Facts:
-        robots = self._plant.robots
-        clearance, distance, progress = robots.facts.T
-        arrived, contact = robots.ending == 1, robots.ending > 2
-        return Facts(arrived, contact, progress, distance, clearance, robots.seen, actions)
+        return _arranged(self._plant.robots.seen.astype(np.float32), self._flat)
 
     def _info(self, chosen: Flags, over: Flags | None = None, truncated: Flags | None = None) -> dict[str, Any]:
         """Return the facts of the chosen robots in new arrays with their masks; at the end of an episode its results, too."""
@@ -265,27 +248,26 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
             "outcome": KEYS[robots.ending if truncated is None else np.where(truncated, len(KEYS) - 1, robots.ending)],
         }
         info = _masked(values, chosen)
-        if over is not None and over.any():
-            for i in np.flatnonzero(over):
-                for key, value in self._plant.results(int(i)).items():
-                    if key not in self._hidden:
-                        info.setdefault(key, np.full(self.num_envs, None, dtype=object))[i] = value
-                        info[f"_{key}"] = over.copy()
+        for i in () if over is None else np.flatnonzero(over).tolist():
+            for key, value in self._plant.results(i).items():
+                if key not in self._hidden:
+                    info.setdefault(key, np.full(self.num_envs, None, dtype=object))[i] = value
+                    info[f"_{key}"] = over
         return info
 
 
 def plant_of(name: str) -> type[KinematicPlant]:
     """Return the class of a plant."""
-    if name == "bullet":
-        from antdrive.gym.physics import PhysicsPlant
-
-        return PhysicsPlant
-    if name != "kinematic":
+    if name == "kinematic":
+        return KinematicPlant
+    if name != "bullet":
         raise InputError(f"plant: unknown {name!r}; choose kinematic or bullet")
-    return KinematicPlant
+    from antdrive.gym.physics import PhysicsPlant
+
+    return PhysicsPlant
 
 
-def compositor_of(task: Task, robot: RobotSpec) -> Any:
+def painter_of(task: Task, robot: RobotSpec) -> Any:
     """Return the films' compositor of a task without a plan."""
     from antdrive.views.film.camera import camera_for
     from antdrive.views.film.compositor import Compositor, drawn_height
@@ -301,13 +283,14 @@ def _masked(values: Mapping[str, Any], mask: Flags) -> dict[str, Any]:
     return {name: part for key, value in values.items() for name, part in ((key, value), (f"_{key}", mask.copy()))}
 
 
-def _observations(beams: int, flat: bool) -> spaces.Space[Any]:
-    low = {"scan": np.zeros(beams), "goal": np.array((0.0, -1.0, -1.0)), "velocity": np.array((-1.0, -1.0))}
-    boxes: dict[str, spaces.Space[Any]] = {
-        key: spaces.Box(value.astype(np.float32), np.float32(1.0), value.shape, np.float32)
-        for key, value in low.items()
-    }
-    if not flat:
-        return spaces.Dict(boxes)
-    lows = np.concatenate(list(low.values())).astype(np.float32)
-    return spaces.Box(lows, np.ones_like(lows), dtype=np.float32)
+def _arranged(seen: Any, flat: bool) -> Any:
+    """Return observations (..., beams + 5) as they are or by name."""
+    parts = np.split(seen, (-5, -2), axis=-1)
+    return seen if flat else dict(zip(("scan", "goal", "velocity"), parts, strict=True))
+
+
+def _space(beams: int, flat: bool) -> spaces.Space[Any]:
+    low = _arranged(np.repeat(np.array((0.0, -1.0), dtype=np.float32), (beams + 1, 4)), flat)
+    if flat:
+        return spaces.Box(low, np.ones_like(low))
+    return spaces.Dict({key: spaces.Box(part, np.ones_like(part)) for key, part in low.items()})

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from antdrive.base import Pose
 from antdrive.base.errors import FieldError
 from antdrive.base.guarded import error_text
 from antdrive.base.progress import progress_bar
@@ -27,7 +28,14 @@ from antdrive.sim.facts import Run as Run
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.contacts import attributed
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import ComponentRecord, DriveRecord, SmoothingRecord, TimesRecord, settings_of
+from antdrive.sim.log.record import (
+    FROM_OUTSIDE,
+    ComponentRecord,
+    DriveRecord,
+    SmoothingRecord,
+    TimesRecord,
+    settings_of,
+)
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import configuration_of, plan_record
@@ -109,6 +117,17 @@ class Session:
         log = self.rollout
         return Run(self._scenario, self.grid, self.plan, log, None if log is None else certify(log))
 
+    @property
+    def true_pose(self) -> Pose:
+        """True pose of the axle's centre, for rewards and tests: a controller must not read it.
+
+        Raises:
+            FieldError: physics is not open.
+        """
+        if self._body is None:
+            raise FieldError("true_pose", "there is no drive: use `with`")
+        return self._plant.state.pose
+
     def observe(self) -> Observation:
         """Return what the robot observes in this control period.
 
@@ -143,7 +162,7 @@ class Session:
         s, mind, per_tick = self._scenario, self.mind, self._plant.per_tick
         guide, facts = mind.guide, configuration_of(s, self.grid, self.plan)
         if not self._by_itself:
-            facts["controller"] = ComponentRecord(name=Session.__name__, settings={})
+            facts["controller"] = ComponentRecord(name=FROM_OUTSIDE, settings={})
         drive_wall_s = time.perf_counter() - self._started
         record = DriveRecord(
             **facts,

@@ -10,8 +10,8 @@ def warm(jobs: options.Jobs = None) -> None:
 
     Optional: otherwise each command compiles what it runs often, at its first use.
     """
-    from antdrive.views.warming import is_warm
-    from antdrive.views.warming import warm as compile_all
+    from antdrive.cli.warming import is_warm
+    from antdrive.cli.warming import warm as compile_all
 
     done = is_warm()
     if not done:

@@ -48,6 +48,8 @@ MAX_HZ = 10_000
 MAX_MARGIN = 1000.0
 
 MARGIN_ROUNDING = 1e-9  # [m]
+#: Name of the controller of a drive that is commanded from outside, see `antdrive.Session`.
+FROM_OUTSIDE = "Session"
 
 
 class Proof(Enum):

@@ -6,13 +6,14 @@ Commands compile a kernel once its calls have taken long in Python.
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import os
 import platform
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from antdrive.base import kernel_cache
 from antdrive.base.errors import InputError
@@ -30,7 +31,9 @@ def is_warm() -> bool:
 
 
 def warm(jobs: int | None = None, progress: Callable[[float], None] | None = None) -> None:
-    """Compile every kernel into the cache: plan with every planner; with PyBullet, drive and film, too.
+    """Compile every kernel into the cache: plan with every planner, drive and film, and drive a batch of `antdrive.gym`.
+
+    Drives need PyBullet, a batch gymnasium.
 
     Args:
         jobs: number of processes; None: one per core
@@ -43,7 +46,8 @@ def warm(jobs: int | None = None, progress: Callable[[float], None] | None = Non
     from antdrive.runs.pool import Pool, cores
 
     marker = _marker()
-    works = [*([None] if has_physics() else []), *PLANNERS]
+    works: list[Any] = [drive_and_film] if has_physics() else []
+    works += [*([drive_batch] if _has_gymnasium() else []), *PLANNERS]
     with Pool(jobs or cores()) as pool:
         for done, _ in enumerate(pool.results(_compile, works, in_order=False), 1):
             if progress is not None:
@@ -52,10 +56,10 @@ def warm(jobs: int | None = None, progress: Callable[[float], None] | None = Non
     marker.touch()
 
 
-def _compile(planner: str | None) -> None:
-    """Plan with a planner; None: drive and film."""
+def _compile(work: str | Callable[[], None]) -> None:
+    """Plan with a planner, or do other work."""
     with kernel_cache.compiled():
-        drive_and_film() if planner is None else plan_with(planner)
+        plan_with(work) if isinstance(work, str) else work()
 
 
 def plan_with(name: str) -> None:
@@ -87,6 +91,19 @@ def drive_and_film() -> None:
         film(log, path, size=(160, 160), fps=2)
         film(log, path, size=(160, 160), fps=2, camera="follow")
         film(ants, path, size=(160, 160), fps=2, prelude=1.0)
+
+
+def drive_batch() -> None:
+    """Drive a kinematic robot with noise in a tiny world."""
+    from antdrive.gym import NavigationVectorEnv
+
+    env = NavigationVectorEnv(1, "world", source=_scenario().task, noise=1.0)
+    env.reset(seed=0)
+    env.step([[0.1, 0.1]])
+
+
+def _has_gymnasium() -> bool:
+    return importlib.util.find_spec("gymnasium") is not None
 
 
 def _log(run: Run) -> Rollout:
@@ -122,5 +139,6 @@ def _marker() -> Path:
         kernel_cache.sources_stamp(),
         platform.machine(),
         os.environ.get("NUMBA_CPU_NAME", ""),
+        "gymnasium" * _has_gymnasium(),
     )
     return folder / f"antdrive-warm-{hashlib.sha256('|'.join(facts).encode()).hexdigest()[:16]}"
