@@ -254,7 +254,10 @@ def test_a_package_adds_a_controller(monkeypatch):
 def test_a_campaign_lists_controllers_and_names_their_faults(folder):
     listed = ["pure-pursuit", "coulter", {"name": "dwa", "reach": 1.0}, "mine.py:Proportional", "mine.py:Raises"]
     data = {"worlds": ["empty"], "planners": ["astar"], "settings": {"controller": listed, "time_limit": 1.0}}
-    jobs = expand(make_campaign(data, folder)).jobs
+    expansion = expand(make_campaign(data, folder))
+    jobs, ((copy, file),) = expansion.jobs, expansion.codes.items()
+    assert f"--controller {copy}:Raises" in jobs[-1].case.written.command()
+    assert (copy.partition("/")[0], file) == ("controllers", folder / "mine.py")
     names = [job.case.resolved.columns["controller"] for job in jobs]
     assert names == ["default", "coulter", "dwa reach=1.0", "Proportional", "Raises"]
     assert [Driving()(job).row["outcome"] for job in jobs] == ["timed_out"] * 4 + ["controller_fault"]
