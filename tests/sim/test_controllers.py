@@ -20,6 +20,7 @@ from antdrive.runs.comparing import Compared
 from antdrive.sim import Scenario, run
 from antdrive.sim.recorded import false_words, rebuilt, written_of
 from antdrive.sim.rerun import rerun
+from antdrive.sim.verifying import false_claims
 from antdrive.sim.written import Written
 from antdrive.worlds import Disc, Task, World
 
@@ -135,6 +136,13 @@ def test_a_record_names_the_controller_and_its_options(name):
     assert not list(false_words(record, settings=True))
 
 
+def test_a_result_that_names_another_controller_is_found():
+    driven = run(scenario("dwa"))
+    for named, wrong in (({"name": "dwa"}, 0), ({"name": "coulter"}, 1), ({"name": "dwa", "reach": 9.0}, 1)):
+        claims = {**driven.as_dict(), "settings": {"controller": named}}
+        assert len([*false_claims(claims, driven.logged)]) == wrong
+
+
 def test_options_without_a_name_are_those_of_pure_pursuit():
     old, new = ({"lookahead_time": 0.5}, {"name": "pure-pursuit", "lookahead_time": 0.5})
     assert scenario(old).controller == scenario(new).controller == PurePursuit(lookahead_time=0.5)
@@ -165,7 +173,8 @@ def test_a_follower_of_ones_own_drives_and_is_named(folder):
     driven = run(scenario({"name": "mine.py:Proportional", "gain": 3.0}))
     assert driven.succeeded
     assert driven.rollout.record.controller.name == "Proportional"
-    assert driven.as_dict()["settings"] == {"controller": {"name": "mine.py:Proportional", "gain": 3.0}}
+    assert driven.as_dict()["settings"] == {"controller": {"name": "Proportional", "gain": 3.0}}
+    assert not [*false_claims(driven.as_dict(), driven.logged)]
     command = written_of(driven.rollout.record).command()
     assert "--controller mine.py:Proportional --set controller.gain=3.0" in command
 

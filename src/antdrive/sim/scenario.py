@@ -255,12 +255,11 @@ class Scenario(Settings):
         there is none.
         """
         task, planner = self.task, self.planner
-        from antdrive.sim.forms import form_of
+        from antdrive.sim.forms import USUAL_CONTROLLER, controller_words
 
-        controller = form_of(SETTINGS["controller"]).write(self.controller)
-        changed: dict[str, Any] = {
-            "controller": settings_of(controller) if isinstance(controller, dict) else controller
-        }
+        name, options = controller_words(self.controller)
+        named = {} if name == USUAL_CONTROLLER else {"name": self.controller_label}
+        changed: dict[str, Any] = {"controller": {**named, **settings_of(options)}}
         for key in ("perception", "avoidance", "replanning"):
             value = self.known_perception if key == "perception" else getattr(self, key)
             usual = Perception() if key == "perception" else SETTINGS[key].default

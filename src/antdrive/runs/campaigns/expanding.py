@@ -114,7 +114,8 @@ def expand(campaign: Campaign) -> Expansion:
     own = {one.word: one.file for one in robots if one.file is not None}
     names = dict.fromkeys(name_and_options(given.get("controller"))[0] for given, _ in settings)
     controllers = [component_of(name, campaign.folder, REGISTRY) for name in names]
-    codes = {one.word.rpartition(":")[0]: one.file for one in (*planners, *controllers) if one.file is not None}
+    files_of_code = [(one.word, one.file) for one in planners] + [(one.word, one.file) for one in controllers]
+    codes = {word.rpartition(":")[0]: file for word, file in files_of_code if file is not None}
     return Expansion(
         tuple(jobs.values()), wanted - len(jobs), counts, files, own, codes, tuple(_remarks(tasks, skipped))
     )
