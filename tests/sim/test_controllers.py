@@ -197,9 +197,9 @@ def test_a_log_that_names_a_users_file_for_a_built_in_controller_is_refused_with
 
 FAULTS = {
     "Raises": "raised ValueError: lost the path (mine.py:34)",
-    "NotFinite": "returned Twist(speed=nan, yaw_rate=0.0); speed and yaw rate must be finite numbers",
+    "NotFinite": "returned Twist(speed=nan, yaw_rate=0.0) instead of a Twist of two finite numbers",
     "Shapeless": "returned (1.0, 2.0, 3.0) instead of (Twist, state)",
-    "Wordy": "returned ('fast', 0.0); speed and yaw rate must be finite numbers",
+    "Wordy": "returned ('fast', 0.0) instead of a Twist of two finite numbers",
     "Exits": "raised SystemExit: 0",
     "Unready": "raised AttributeError",
     "Incapable": "declares 7 instead of ControllerCapabilities",
@@ -282,6 +282,17 @@ def test_a_comparison_reports_a_fault_of_the_controller(folder):
 def test_a_footprint_needs_a_controller_that_turns():
     with pytest.raises(FieldError, match="exact: stanley follows no routes with turns on the spot"):
         Scenario.of("forest", "astar", "jackal", controller="stanley", footprint="exact")
+
+
+def test_a_subclass_of_pure_pursuit_drives_by_its_own_code():
+    class Slow(PurePursuit):
+        def step(self, now, path, state):
+            command, state = super().step(now, path, state)
+            return command._replace(speed=0.1), state
+
+    s = scenario(Slow(), time_limit=1.0)
+    assert s.key != scenario("pure-pursuit", time_limit=1.0).key
+    assert run(s).rollout.command[:, 0].max() <= 0.1
 
 
 def test_dwa_gives_way_to_a_mover_without_local_avoidance():

@@ -329,10 +329,16 @@ def _undeclared_options(kind: type, options_base: type) -> str:
 
 def _mismatch(function: Any, *arguments: Any) -> str:
     """Return why a function cannot be called with these arguments; empty if it can, or if its signature is unknown."""
+    if (
+        inspect.iscoroutinefunction(function)
+        or inspect.isgeneratorfunction(function)
+        or inspect.isasyncgenfunction(function)
+    ):
+        return "it is asynchronous, or yields"
     try:
         signature = inspect.signature(function)
-    except ValueError:  # compiled
-        return ""
+    except ValueError as error:
+        return str(error) if isinstance(function, types.MethodType) else ""  # compiled
     try:
         signature.bind(*arguments)
     except TypeError as error:

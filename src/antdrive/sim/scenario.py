@@ -213,7 +213,7 @@ class Scenario(Settings):
         fields |= {"margin": self.planned_margin, "perception": self.known_perception}
         fields |= {name: known.pop(name) for name in fields.keys() & known.keys()}
         planner: Any = self.planner
-        if not isinstance(self.controller, PurePursuit):
+        if type(self.controller) is not PurePursuit:
             own = {} if is_built_in(self.controller) else {"file": module_hash(type(self.controller).__module__)}
             fields["controller"] = {"name": self.controller_label, **options_of(self.controller), **own}
         parts = {
