@@ -295,6 +295,10 @@ def test_a_subclass_of_pure_pursuit_drives_by_its_own_code():
     assert run(s).rollout.command[:, 0].max() <= 0.1
 
 
+def test_dwa_looks_past_the_ends_of_walls_and_not_through_them():
+    assert run(Scenario.of("slalom", "astar", controller="dwa")).succeeded
+
+
 def test_dwa_gives_way_to_a_mover_without_local_avoidance():
     driven = run(Scenario.of("people-crossing", "astar", controller="dwa"))
     assert "avoid" not in {driven.rollout.record.limiters[k] for k in set(driven.rollout.limiter.tolist())}

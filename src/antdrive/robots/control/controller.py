@@ -104,18 +104,20 @@ class Following:
 
     def _checked(self, answer: Any) -> Twist:
         """Return the command of an answer (twist, state)."""
-        problem = f"returned {value_text(answer, 60)} instead of (Twist, state)"
+        wanted = "(Twist, state)"
         if isinstance(answer, tuple) and len(answer) == 2:
-            if (twist := finite_twist(answer[0])) is not None:
+            answer, wanted = answer[0], "a Twist of two finite numbers"
+            if (twist := finite_twist(answer)) is not None:
                 return twist
-            problem = f"returned {value_text(answer[0], 60)} instead of a Twist of two finite numbers"
+        problem = f"returned {value_text(answer, 60)} instead of {wanted}"
         raise ControllerError(self._name, f"{problem} ({ControllerError.place_of(self._controller)})")
 
 
 def _copied(record: Arrays) -> Arrays:
     """Return a named tuple with copies of its writable arrays; kernels are compiled for others as they are."""
     arrays = {key: one for key, one in record._asdict().items() if isinstance(one, np.ndarray) and one.flags.writeable}
-    return record._replace(**{key: one.copy() for key, one in arrays.items()})
+    copied: Arrays = record._replace(**{key: one.copy() for key, one in arrays.items()})
+    return copied
 
 
 def _turned_round(now: Observation) -> Observation:
