@@ -33,18 +33,9 @@ def best_velocity(
     x: float, y: float, yaw: float, v: float, w: float, top: float, target_x: float, target_y: float, discs: Array,
     bounds: Array, radius: float, limits: MotionLimits, tuning: WindowTuning,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the best admissible velocity of the window; full braking without one.
+    """Return the best admissible velocity of the window around the last command (v, w), up to a speed; full braking without one.
 
-    Args:
-        x, y, yaw: the robot's pose
-        v, w: its last command
-        top: speed limit [m/s]
-        target_x, target_y: the target [m]
-        discs: obstacles: x, y and radius (D, 3) [m]
-        bounds: the walls (4,) [m]
-        radius: distance of the robot's centre to keep from obstacles [m]
-        limits: the robot's limits
-        tuning: the approach's options
+    The robot's centre keeps a radius [m] from discs (D, 3) and walls (4,).
     """
     t, a, b = tuning.interval, limits.acceleration, limits.yaw_acceleration
     slowest = max(v - a * t, 0.0)
