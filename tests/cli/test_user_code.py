@@ -1,6 +1,7 @@
 """User planners that end their process, never end, or answer nonsense: named in one line, and other runs go on."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -175,6 +176,46 @@ def test_a_comparison_goes_on_after_a_planners_error(folder, antdrive, monkeypat
     assert runs["a"]["outcome"] == "planner_fault"
     assert "limit of 1 s" in runs["a"]["reason"]
     assert runs["b"]["succeeded"]
+
+
+CONTROLLERS = """import os
+
+class Right:
+    fault = staticmethod(lambda: None)
+    def start(self, briefing, path): return None
+    def step(self, now, path, state):
+        if now.tick > 9: self.fault()
+        return (0.1, 0.0), state
+
+def stubborn():
+    while True:
+        try: stubborn()
+        except BaseException: pass
+
+class Exits(Right): fault = staticmethod(lambda: os._exit(0))
+class Crashes(Right): fault = staticmethod(lambda: os.kill(os.getpid(), 11))
+class Stubborn(Right): fault = staticmethod(stubborn)
+class Raises(Right): fault = staticmethod(lambda: 1 / 0)
+"""
+
+
+@pytest.mark.slow
+def test_a_sweep_names_controllers_that_end_their_process_or_never_end_and_goes_on(folder):
+    (folder / "own.py").write_text(CONTROLLERS)
+    names = ("Right", "Exits", "Crashes", "Stubborn", "Raises")
+    words = [word for name in names for word in ("--controller", f"own.py:{name}")]
+    place = ("--world", "short.yaml", "--planner", "astar", "--time-limit", "0.5", "--jobs", "1", "--out", "out")
+    done = process("sweep", *place, *words, "--keep", "none")
+    assert done.returncode == 3
+    assert re.search(r"controller_fault +4\n", done.stdout)
+    assert re.search(r"timed_out +1\n", done.stdout)
+    for says in (
+        "Exits (own.py:6) ended the process with exit code 0",
+        "Crashes (own.py:6) ended the process by SIGSEGV",
+        "Stubborn (own.py:6) took longer than the limit of 0.3 s",
+        "Raises raised ZeroDivisionError: division by zero (own.py:18)",
+    ):
+        assert f"antdrive: controller {says} (1 run)\n" in done.stderr
 
 
 @pytest.mark.slow

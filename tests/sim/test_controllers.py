@@ -20,6 +20,7 @@ from antdrive.runs.comparing import Compared
 from antdrive.sim import Scenario, run
 from antdrive.sim.recorded import false_words, rebuilt, written_of
 from antdrive.sim.rerun import rerun
+from antdrive.sim.verifying import false_claims
 from antdrive.sim.written import Written
 from antdrive.worlds import Disc, Task, World
 
@@ -135,6 +136,13 @@ def test_a_record_names_the_controller_and_its_options(name):
     assert not list(false_words(record, settings=True))
 
 
+def test_a_result_that_names_another_controller_is_found():
+    driven = run(scenario("dwa"))
+    for named, wrong in (({"name": "dwa"}, 0), ({"name": "coulter"}, 1), ({"name": "dwa", "reach": 9.0}, 1)):
+        claims = {**driven.as_dict(), "settings": {"controller": named}}
+        assert len([*false_claims(claims, driven.logged)]) == wrong
+
+
 def test_options_without_a_name_are_those_of_pure_pursuit():
     old, new = ({"lookahead_time": 0.5}, {"name": "pure-pursuit", "lookahead_time": 0.5})
     assert scenario(old).controller == scenario(new).controller == PurePursuit(lookahead_time=0.5)
@@ -165,7 +173,8 @@ def test_a_follower_of_ones_own_drives_and_is_named(folder):
     driven = run(scenario({"name": "mine.py:Proportional", "gain": 3.0}))
     assert driven.succeeded
     assert driven.rollout.record.controller.name == "Proportional"
-    assert driven.as_dict()["settings"] == {"controller": {"name": "mine.py:Proportional", "gain": 3.0}}
+    assert driven.as_dict()["settings"] == {"controller": {"name": "Proportional", "gain": 3.0}}
+    assert not [*false_claims(driven.as_dict(), driven.logged)]
     command = written_of(driven.rollout.record).command()
     assert "--controller mine.py:Proportional --set controller.gain=3.0" in command
 
@@ -188,9 +197,9 @@ def test_a_log_that_names_a_users_file_for_a_built_in_controller_is_refused_with
 
 FAULTS = {
     "Raises": "raised ValueError: lost the path (mine.py:34)",
-    "NotFinite": "returned Twist(speed=nan, yaw_rate=0.0); speed and yaw rate must be finite numbers",
+    "NotFinite": "returned Twist(speed=nan, yaw_rate=0.0) instead of a Twist of two finite numbers",
     "Shapeless": "returned (1.0, 2.0, 3.0) instead of (Twist, state)",
-    "Wordy": "returned ('fast', 0.0); speed and yaw rate must be finite numbers",
+    "Wordy": "returned ('fast', 0.0) instead of a Twist of two finite numbers",
     "Exits": "raised SystemExit: 0",
     "Unready": "raised AttributeError",
     "Incapable": "declares 7 instead of ControllerCapabilities",
@@ -254,7 +263,10 @@ def test_a_package_adds_a_controller(monkeypatch):
 def test_a_campaign_lists_controllers_and_names_their_faults(folder):
     listed = ["pure-pursuit", "coulter", {"name": "dwa", "reach": 1.0}, "mine.py:Proportional", "mine.py:Raises"]
     data = {"worlds": ["empty"], "planners": ["astar"], "settings": {"controller": listed, "time_limit": 1.0}}
-    jobs = expand(make_campaign(data, folder)).jobs
+    expansion = expand(make_campaign(data, folder))
+    jobs, ((copy, file),) = expansion.jobs, expansion.codes.items()
+    assert f"--controller {copy}:Raises" in jobs[-1].case.written.command()
+    assert (copy.partition("/")[0], file) == ("controllers", folder / "mine.py")
     names = [job.case.resolved.columns["controller"] for job in jobs]
     assert names == ["default", "coulter", "dwa reach=1.0", "Proportional", "Raises"]
     assert [Driving()(job).row["outcome"] for job in jobs] == ["timed_out"] * 4 + ["controller_fault"]
@@ -270,6 +282,21 @@ def test_a_comparison_reports_a_fault_of_the_controller(folder):
 def test_a_footprint_needs_a_controller_that_turns():
     with pytest.raises(FieldError, match="exact: stanley follows no routes with turns on the spot"):
         Scenario.of("forest", "astar", "jackal", controller="stanley", footprint="exact")
+
+
+def test_a_subclass_of_pure_pursuit_drives_by_its_own_code():
+    class Slow(PurePursuit):
+        def step(self, now, path, state):
+            command, state = super().step(now, path, state)
+            return command._replace(speed=0.1), state
+
+    s = scenario(Slow(), time_limit=1.0)
+    assert s.key != scenario("pure-pursuit", time_limit=1.0).key
+    assert run(s).rollout.command[:, 0].max() <= 0.1
+
+
+def test_dwa_looks_past_the_ends_of_walls_and_not_through_them():
+    assert run(Scenario.of("slalom", "astar", controller="dwa")).succeeded
 
 
 def test_dwa_gives_way_to_a_mover_without_local_avoidance():

@@ -25,9 +25,9 @@ def followed(scenario, periods=math.inf):
     """A drive that is commanded by pure pursuit from outside, for some periods."""
     controller = PurePursuit()
     with Session(scenario) as drive:
-        command, state = Twist(0.0, 0.0), PursuitState()
+        state = PursuitState()
         while not drive.ended and (now := drive.observe()).tick < periods:
-            command, state = controller.step(drive.path, now.pose, command, state)
+            command, state = controller.step(now, drive.path, state)
             drive.step(command)
     return drive.run
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import sys
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar, TypeVar, cast
 
 from antdrive.base.errors import input_error
-from antdrive.base.guarded import OverLimit, UserCode, error_text, place
+from antdrive.base.guarded import OverLimit, UserCode, error_text, place, value_text
+
+Declared = TypeVar("Declared")
 
 
 class ComponentError(RuntimeError):
@@ -52,6 +55,25 @@ class ComponentError(RuntimeError):
         own = is_built_in(component)
         who = f"{cls.kind} {called}" if own else f"{cls.kind} {called} ({cls.place_of(component)})"
         return UserCode(who, error_of, (ComponentError,), own)
+
+    @classmethod
+    def declared(cls, component: Any, usual: Declared) -> Declared:
+        """Return the `capabilities` that a component declares; the usual ones if it declares none.
+
+        Raises:
+            ComponentError: they have another type, or raise an exception.
+        """
+        with cls.guard(component):
+            try:
+                capabilities = component.capabilities
+            except AttributeError:
+                if inspect.getattr_static(component, "capabilities", None) is not None:
+                    raise
+                capabilities = usual
+        if not issubclass(type(capabilities), type(usual)):
+            problem = f"declares {value_text(capabilities)} instead of {type(usual).__name__}"
+            raise cls(type(component).__name__, problem)
+        return cast(Declared, capabilities)
 
     @classmethod
     def place_of(cls, component: object, error: BaseException | None = None) -> str:

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any
 
 from antdrive.base import supervision, system
-from antdrive.base.errors import InputError, Terminated, input_error
+from antdrive.base.errors import InputError, Terminated, input_error, visible
 from antdrive.base.process_state import ProcessState
 
 LIMIT = "ANTDRIVE_PLAN_LIMIT"  # variable of the environment with the limit on planning time, seconds or "off"
@@ -32,8 +32,8 @@ def error_text(error: BaseException) -> str:
 
 
 def value_text(value: object, longest: int = 40) -> str:
-    """Return a value's `repr`, shortened; if that raises, its type."""
-    return _text(lambda: repr(value), f"a {type(value).__name__}", longest)
+    """Return a value's `repr` in one line, shortened; if that raises, its type."""
+    return _text(lambda: visible(repr(value)), f"a {type(value).__name__}", longest)
 
 
 def place(error: BaseException, home: str | None) -> str:

@@ -21,7 +21,15 @@ from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError, InputError, visible
 from antdrive.base.guarded import OverLimit, UserCode, error_text, one_line, place
 from antdrive.base.records import meanings_of
-from antdrive.base.user_code import LOADED, is_user_code, module_hash, user_code_version, user_object, word_of
+from antdrive.base.user_code import (
+    LOADED,
+    is_user_code,
+    module_hash,
+    record_name,
+    user_code_version,
+    user_object,
+    word_of,
+)
 from antdrive.base.version import __version__
 
 DECORATOR = "@dataclass(frozen=True, kw_only=True)"
@@ -82,6 +90,28 @@ class Registry(Generic[Component]):
             made = self._instance(LOADED[self.kind, name], f"{self.kind} {name!r}")
             return self._with_options(name, made, options)
         return self.load(self.registered_name(name), **options)
+
+    def of_record(self, name: str, settings: Mapping[str, Any], given: Component | str | None) -> Component:
+        """Return the component with a name and settings in a record.
+
+        Args:
+            name: its name in the record
+            settings: its options
+            given: the component, or FILE.py:CLASS or MODULE:CLASS; None: by its name
+
+        Raises:
+            InputError: it cannot be found, or has another name.
+        """
+        if given is None:
+            return self.load(self.registered_name(name), **settings)
+        if not isinstance(given, str):
+            return given
+        if record_name(given) not in (given, name):
+            raise InputError(f"{self.kind}: the log's {self.kind} is {name!r:.60}, not {record_name(given)!r:.60}")
+        if not is_user_code(given):
+            rest = f"got {given!r:.60}; omit it for registered {self.kind}s"
+            raise InputError(f"{self.kind}: write FILE.py:CLASS or MODULE:CLASS, {rest}")
+        return self.load(given, **settings)
 
     def registered_name(self, name: str) -> str:
         """Return the registered name of a record's component, which may be that of its class."""
@@ -329,10 +359,16 @@ def _undeclared_options(kind: type, options_base: type) -> str:
 
 def _mismatch(function: Any, *arguments: Any) -> str:
     """Return why a function cannot be called with these arguments; empty if it can, or if its signature is unknown."""
+    if (
+        inspect.iscoroutinefunction(function)
+        or inspect.isgeneratorfunction(function)
+        or inspect.isasyncgenfunction(function)
+    ):
+        return "it is asynchronous, or yields"
     try:
         signature = inspect.signature(function)
-    except ValueError:  # compiled
-        return ""
+    except ValueError as error:
+        return str(error) if isinstance(function, types.MethodType) else ""  # compiled
     try:
         signature.bind(*arguments)
     except TypeError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from antdrive.base.checks import grouped
 from antdrive.base.errors import FieldError, InputError
@@ -28,34 +27,23 @@ def check_worlds(words: Sequence[str]) -> None:
             raise InputError(error.problem) from None
 
 
-class Entrant(NamedTuple):
-    """What is compared under a label.
-
-    Attributes:
-        setup: options of `run`
-        controller: the controller by its key in files; empty for the default
-    """
-
-    setup: Setup
-    controller: dict[str, str]
-
-
 def entrants_of(
     planners: Sequence[str] | None,
     settings: Sequence[str] | None,
     robot: str,
     controllers: Sequence[str] | None = None,
-) -> dict[str, Entrant]:
+) -> dict[str, Setup]:
     """Parse planners, or several controllers with one planner, written NAME or LABEL=NAME, with their `--set GROUP.KEY=VALUE`.
 
     Return what is compared by label; a single controller is that of all.
     """
-    follow, kind = len(controllers or ()) > 1, "planner"
+    controllers = controllers or ()
+    follow, kind = len(controllers) > 1, "planner"
     words, labels = planners or (), dict[str, str]()
     if follow:
         if len(words) != 1:
             raise InputError("--planner: give one, with which several controllers are compared")
-        words, kind = controllers or (), "controller"
+        words, kind = controllers, "controller"
     for word in words:
         label, mark, name = word.partition("=")
         if not label or (mark and not name) or label in GROUPS or (mark and not re.fullmatch(r"[\w-]{1,40}", label)):
@@ -76,10 +64,6 @@ def entrants_of(
         group, name, value = grouped(text, (*labels, *GROUPS))
         for label in labels if group in GROUPS else [group]:
             own[label].append(f"{group if group in GROUPS else kind}.{name}={value}")
-    if follow:
-        (planner,) = planners or ()
-        return {
-            label: Entrant(Setup(planner, own[label], robot), {"controller": name}) for label, name in labels.items()
-        }
-    given = {"controller": controllers[0]} if controllers else {}
-    return {label: Entrant(Setup(name, own[label], robot), given) for label, name in labels.items()}
+    for label, name in labels.items() if controllers else ():
+        own[label].append(f"controller.name={name if follow else controllers[0]}")
+    return {label: Setup((planners or ())[0] if follow else name, own[label], robot) for label, name in labels.items()}

@@ -164,6 +164,7 @@ Log = Annotated[Path, argument("ROLLOUT", "Log of a drive, or folder of a run.")
 Robot = Annotated[str, option("NAME", "Robot name or file.", panel="Robot")]
 Planner = Annotated[str, option("NAME", "Planner name or FILE.py:CLASS.", panel="Planner")]
 LogPlanner = Annotated[str | None, option("FILE.py:CLASS", "Class of the log's planner, if not registered.")]
+LogController = Annotated[str | None, option("FILE.py:CLASS", "Class of the log's controller, if not registered.")]
 Out = Annotated[Path | None, option("FOLDER", "Output folder.  [default: a folder in out/]", panel="Output")]
 Prelude = Annotated[
     float,

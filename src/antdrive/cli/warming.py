@@ -76,6 +76,7 @@ def plan_with(name: str) -> None:
 
 def drive_and_film() -> None:
     """Drive in a tiny world, with and without a map, and film the drives."""
+    from antdrive.robots import CONTROLLERS
     from antdrive.sim.pipeline import run
     from antdrive.views.film.video import film
     from antdrive.worlds import Cruising
@@ -85,6 +86,8 @@ def drive_and_film() -> None:
     run(replace(_scenario(), task=replace(task, world=replace(task.world, movers=(comes,)))))
     run(_oblong(_scenario()))  # the controller's kernel for lines
     run(replace(_scenario(), map="none", localisation="matching"))
+    for controller in CONTROLLERS.values():
+        run(replace(_scenario(), controller=controller))
     log, ants = _log(run(_scenario())), _log(run(_scenario("as")))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "warm.mp4"

@@ -15,10 +15,9 @@ import numpy.typing as npt
 
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError
-from antdrive.base.guarded import value_text
 from antdrive.base.kernel_cache import clock, compiled
 from antdrive.base.plane import format_fixed
-from antdrive.planners.errors import PlannerError, planner_errors
+from antdrive.planners.errors import PlannerError
 from antdrive.worlds import MoverMotion, Task
 from antdrive.worlds.route import cells_beside
 
@@ -357,11 +356,7 @@ def capabilities_of(planner: Planner) -> Capabilities:
     Raises:
         PlannerError: its attribute `capabilities` has another type, or raises an exception.
     """
-    with planner_errors(planner):
-        declared: Any = getattr(planner, "capabilities", Capabilities())
-    if not issubclass(type(declared), Capabilities):
-        raise PlannerError(type(planner).__name__, f"declares {value_text(declared)} instead of Capabilities")
-    return cast(Capabilities, declared)
+    return PlannerError.declared(planner, Capabilities())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -53,20 +52,5 @@ REGISTRY: Registry[Planner] = Registry(
 )
 
 
-def load_planner(name: str, home: Path | None = None, /, **options: Any) -> Planner:
-    """Return the named planner with options set.
-
-    Args:
-        name: one of `list_planners()`, or FILE.py:CLASS or MODULE:CLASS for user code
-        home: folder of user code; None: the working directory
-        options: the planner's options by name; values may be text, as from a command line
-
-    Raises:
-        InputError: the planner or option is unknown, or the value is invalid; lists the valid choices. Its key is `planner`,
-            or `planner.` and the option.
-    """
-    return REGISTRY.load(name, home, **options)
-
-
-list_planners, planner_version = REGISTRY.all, REGISTRY.version
+load_planner, list_planners, planner_version = REGISTRY.load, REGISTRY.all, REGISTRY.version
 recorded_planner, registered_name = REGISTRY.recorded, REGISTRY.registered_name

@@ -259,7 +259,7 @@ def campaign_data(
     """Return the campaign that drives every world `trials` times, as plain data."""
     files = sorted(folder.rglob(WORLDS), key=lambda path: (len(path.stem), path.stem))
     noise = settings["noise"]
-    driven = [{key: value for key, value in settings.items() if key != "noise"}]
+    driven = [{key: value for key, value in settings.items() if key != "noise" and value is not None}]
     if with_map:
         driven.append({**driven[0], "map": "given", "localisation": localisation_with_map(settings["localisation"])})
     return {

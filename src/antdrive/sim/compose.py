@@ -148,7 +148,7 @@ def route_planner(s: Scenario) -> RoutePlanner:
 
 def _follow(s: Scenario, briefing: Briefing, movers: PerceivedMovers) -> Rule:
     """Return the rule that follows the path: pure pursuit, or another controller on what it is given."""
-    if isinstance(s.controller, PurePursuit):
+    if type(s.controller) is PurePursuit:
         return Pursuit(s.controller, full_turn(s.robot, s.control_hz))
     return ByController(Following(s.controller, s.controller_label, briefing), movers)
 

@@ -189,7 +189,7 @@ def _ends(log: LoggedRun) -> dict[str, Any]:
 def _changes(log: LoggedRun) -> dict[str, Any]:
     """Return the keys of `settings` that the log repeats, without the rules among movers that were asked for."""
     return {
-        "controller": log.record.controller.settings,
+        "controller": {"name": log.record.controller.name, **log.record.controller.settings},
         **(SENSED if log.record.sensing is None else settings_of(log.record.sensing)),
         "unseen": [[disc.x, disc.y, disc.radius] for disc in log.record.unseen],
         **OTHERS,

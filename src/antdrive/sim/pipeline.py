@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import time
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from antdrive.base import Pose
 from antdrive.base.errors import FieldError
-from antdrive.base.guarded import error_text
+from antdrive.base.guarded import error_text, value_text
 from antdrive.base.progress import progress_bar
 from antdrive.base.version import require_physics, versions
 from antdrive.planners import PlanResult
 from antdrive.robots import Observation, TrackedPath, Twist
+from antdrive.robots.control.observation import finite_twist
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import Progress, drive, ignore_progress
@@ -147,7 +146,11 @@ class Session:
             FieldError: the command is not two finite numbers, or there is no drive.
         """
         if note is SILENT:
-            self._by_itself, command = False, command if command is None else Twist(*_finite(command))
+            self._by_itself = False
+            if command is not None and (command := finite_twist(given := command)) is None:
+                raise FieldError(
+                    "command", f"must be two finite numbers, a speed and a yaw rate, got {value_text(given, 60)}"
+                )
         self._driving("step").step(command, note)
 
     def _driving(self, call: str) -> Body:
@@ -186,21 +189,6 @@ class Session:
         }
         rows |= {"route": self._route.xy, "cells": self.plan.cells}
         return attributed(Rollout(**rows | body.logged(log, per_tick) | mind.logged(log, per_tick), record=record))
-
-
-def _finite(command: Sequence[float]) -> tuple[float, float]:
-    """Return a command's two numbers.
-
-    Raises:
-        FieldError: it has no two finite numbers.
-    """
-    try:
-        speed, yaw_rate = map(float, command)
-    except (TypeError, ValueError):
-        speed = yaw_rate = math.nan
-    if not (math.isfinite(speed) and math.isfinite(yaw_rate)):
-        raise FieldError("command", f"must be two finite numbers, a speed and a yaw rate, got {command!r:.60}")
-    return speed, yaw_rate
 
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:

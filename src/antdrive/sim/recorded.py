@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.user_code import is_user_code, record_name
 from antdrive.planners import PLANNERS, Planner, load_planner
-from antdrive.planners.registry import registered_name
+from antdrive.planners.registry import REGISTRY, registered_name
 from antdrive.robots.robot_file import list_robots
 from antdrive.sim.forms import USUAL_CONTROLLER, name_and_options, require_settings, scenario_fields, written
 from antdrive.sim.log.record import DriveRecord, settings_of
@@ -132,38 +132,18 @@ def rebuilt(
     Raises:
         InputError: the planner or controller cannot be found by its name, or has custom settings.
     """
-    name = record.planner.name
-    made: dict[str, Any] = {"task": record.task, "robot": record.robot, "planner_name": name}
-    if isinstance(planner, str):
-        if record_name(planner) not in (planner, name):
-            raise InputError(f"planner: the log's planner is {name!r:.60}, not {record_name(planner)!r:.60}")
-        if not is_user_code(planner):
-            raise InputError(
-                f"planner: write FILE.py:CLASS or MODULE:CLASS, got {planner!r:.60}; omit it for registered planners"
-            )
-        word = planner
-    elif planner is None:
-        word = made["planner_name"] = registered_name(name)
-    else:
-        word, made["planner"] = "", planner
-    from antdrive.robots.controllers.registry import REGISTRY, load_controller
+    from antdrive.robots.controllers.registry import REGISTRY as CONTROLLER_REGISTRY
 
-    if isinstance(controller, str):
-        if record_name(controller) != record.controller.name:
-            raise InputError(
-                f"controller: the log's controller is {record.controller.name!r:.60}, not {record_name(controller)!r:.60}"
-            )
-        made["controller"] = load_controller(controller, **record.controller.settings)
-    elif controller is not None:
-        made["controller"] = controller
-    elif built_in_controller(record.controller.name) is None:
-        made["controller"] = REGISTRY.recorded(record.controller.name, **record.controller.settings)
+    name = record.planner.name if planner is not None else registered_name(record.planner.name)
+    made: dict[str, Any] = {"task": record.task, "robot": record.robot, "planner_name": name}
+    made["planner"] = REGISTRY.of_record(record.planner.name, record.planner.settings, planner)
+    made["controller"] = CONTROLLER_REGISTRY.of_record(record.controller.name, record.controller.settings, controller)
     try:
         settings = _settings_in_force(record)
     except (FieldError, InputError) as error:
         raise InputError(str(FieldError(error.key, error.problem).under("record"))) from None
     words = Written(
-        world="", planner=word, options=record.planner.settings, settings=settings, seed=record.seed,
+        world="", planner="", options=record.planner.settings, settings=settings, seed=record.seed,
     )  # fmt: skip
 
     def at(key: str, problem: str) -> InputError:

@@ -213,7 +213,7 @@ class Scenario(Settings):
         fields |= {"margin": self.planned_margin, "perception": self.known_perception}
         fields |= {name: known.pop(name) for name in fields.keys() & known.keys()}
         planner: Any = self.planner
-        if not isinstance(self.controller, PurePursuit):
+        if type(self.controller) is not PurePursuit:
             own = {} if is_built_in(self.controller) else {"file": module_hash(type(self.controller).__module__)}
             fields["controller"] = {"name": self.controller_label, **options_of(self.controller), **own}
         parts = {
@@ -255,12 +255,11 @@ class Scenario(Settings):
         there is none.
         """
         task, planner = self.task, self.planner
-        from antdrive.sim.forms import form_of
+        from antdrive.sim.forms import USUAL_CONTROLLER, controller_words
 
-        controller = form_of(SETTINGS["controller"]).write(self.controller)
-        changed: dict[str, Any] = {
-            "controller": settings_of(controller) if isinstance(controller, dict) else controller
-        }
+        name, options = controller_words(self.controller)
+        named = {} if name == USUAL_CONTROLLER else {"name": self.controller_label}
+        changed: dict[str, Any] = {"controller": {**named, **settings_of(options)}}
         for key in ("perception", "avoidance", "replanning"):
             value = self.known_perception if key == "perception" else getattr(self, key)
             usual = Perception() if key == "perception" else SETTINGS[key].default

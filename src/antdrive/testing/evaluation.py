@@ -19,7 +19,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.runs.pool import Pool, WorkerDied, in_new_process
 from antdrive.runs.suites.baseline import Baseline, fixed_hashes
 from antdrive.runs.suites.demands import Demands
-from antdrive.runs.suites.evaluation import RAISED, Evaluation, changes, evaluate, explain, unmet_demands
+from antdrive.runs.suites.evaluation import Evaluation, changes, evaluate, explain, unmet_demands
 from antdrive.runs.suites.scenarios import run_command, scenario_of
 from antdrive.runs.suites.suite import SuiteCase, shown_path
 from antdrive.sim.pipeline import Run
@@ -32,7 +32,9 @@ from antdrive.views.artefacts import MOST_FILMS, Results, remove_artefacts, writ
 Update: TypeAlias = Literal["", "new", "all"]
 #: Outcomes of a test that could not be evaluated: invalid input or internal error.
 INVALID_INPUT, INTERNAL_ERROR = "wrong_input", "internal_error"
-_REPEATED: dict[type, bool] = {}  # whether a new process repeats a planner's plans, by its class
+_REPEATED: dict[
+    tuple[type, type], bool
+] = {}  # whether a new process repeats runs, by classes of planner and controller
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,24 +162,24 @@ class Criteria:
         return None if self.again is None else in_new_process(self.again)
 
     def _is_unsteady(self, run: Run) -> bool:
-        """Return whether the planner of an accepted drive does not repeat its plan."""
+        """Return whether the planner or the controller of an accepted drive does not repeat its run."""
         s, first = run.scenario, fingerprint_of(run.scenario, run.plan, run.rollout)
-        kind = type(s.planner)
+        kind = type(s.planner), type(s.controller)
 
         def elsewhere() -> str:
-            if kind not in _REPEATED:  # a new process takes seconds: one for each planner
+            if kind not in _REPEATED:  # a new process takes seconds: one for each
                 _REPEATED[kind] = self._elsewhere() in (None, first)
             return first if _REPEATED[kind] else ""
 
         return is_unsteady(s, first, elsewhere)
 
     def raised(self, s: Scenario, error: ComponentError) -> CheckResult:
-        """Return the result of a test whose planner raised an error, with what has changed since the baseline."""
+        """Return the result of a test whose planner or controller raised an error, with what has changed since the baseline."""
         details: tuple[str, ...] = ()
         with suppress(InputError):
             if self.baseline is not None and (earlier := Baseline.own(self.baseline, self.name)) is not None:
                 details = tuple(changes(s, fixed_hashes(s), earlier))
-        return self.failed_early(RAISED, str(error), error, details)
+        return self.failed_early(f"{error.kind}_error", str(error), error, details)
 
     def failed_early(
         self, outcome: str, fault: str, error: BaseException, details: tuple[str, ...] = ()
@@ -313,7 +315,8 @@ def _evaluate_in_turn(
     with Pool(jobs) as pool:
         for case, done in zip(cases, pool.in_order(work, cases), strict=True):
             if done.fault:
-                yield _criteria_of(case, update, results).failed_early(RAISED, done.died, WorkerDied(done.died))
+                outcome = f"{done.died.partition(' ')[0]}_error"
+                yield _criteria_of(case, update, results).failed_early(outcome, done.died, WorkerDied(done.died))
             elif done.died:
                 fault = f"internal error: {done.died}"
                 yield _criteria_of(case, update, results).failed_early(INTERNAL_ERROR, fault, WorkerDied(done.died))

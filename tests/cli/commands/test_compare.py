@@ -149,7 +149,7 @@ def test_controllers_are_compared_with_one_planner(antdrive, small):
     runs = json.loads(out)["runs"]
     assert code == 0
     assert {name: run["settings"]["controller"] for name, run in runs.items()} == {
-        "stanley": "stanley",
+        "stanley": {"name": "stanley"},
         "wide": {"name": "dwa", "reach": 1.5},
     }
 

@@ -8,15 +8,16 @@ import pytest
 
 from antdrive.robots import Observation, Twist
 from antdrive.robots.control.observation import Movers
+from antdrive.robots.controllers._kernels_dwa import discs_ahead, free_arc
 from antdrive.robots.controllers.coulter import Coulter, turn_on_spot
-from antdrive.robots.controllers.dwa import DynamicWindow, WindowState, free_arcs
+from antdrive.robots.controllers.dwa import DynamicWindow
 from antdrive.robots.controllers.stanley import Stanley
 from antdrive.worlds import Disc, World
 from tests.robots.controllers.test_contract import EMPTY, ROBOT, path_of
 
 LINE = path_of([(0.5, 2.0), (7.5, 2.0)])
 MOVER = Movers(np.zeros(1, int), np.array([[3.45, 2.0]]), np.zeros((1, 2)), np.array([0.2]))
-WALLS = (0.0, 0.0, 8.0, 8.0)
+WALLS = np.array([0.0, 0.0, 8.0, 8.0])
 
 
 def at(pose, speed=0.3, yaw_rate=0.0):
@@ -67,6 +68,11 @@ def sampled(pose, k, discs, radius, reach, step=1e-4):
     return s[touching.argmax()] if touching.any() else reach
 
 
+def free_arcs(pose, curvatures, discs, radius, reach):
+    near = discs_ahead(*pose, discs, WALLS, radius)
+    return [free_arc(k, near, reach) for k in curvatures]
+
+
 def test_free_arcs_end_where_sampled_ones_touch():
     rng = np.random.default_rng(1)
     for _ in range(60):
@@ -74,34 +80,31 @@ def test_free_arcs_end_where_sampled_ones_touch():
         discs = np.column_stack([rng.uniform(0.0, 8.0, (6, 2)), rng.uniform(0.1, 0.5, 6)])
         discs = discs[np.hypot(discs[:, 0] - pose[0], discs[:, 1] - pose[1]) > discs[:, 2] + 0.3]
         k = np.append(rng.uniform(-3.0, 3.0, 8), 0.0)
-        exact = free_arcs(pose, k, discs, WALLS, 0.2, 5.0)
+        exact = free_arcs(pose, k, discs, 0.2, 5.0)
         np.testing.assert_allclose(exact, [sampled(pose, one, discs, 0.2, 5.0) for one in k], atol=2e-3)
 
 
 def test_a_robot_that_is_too_close_may_leave_but_not_approach():
     discs = np.array([[3.5, 3.0, 0.3]])
-    towards, away = (
-        free_arcs((3.0, 3.0, 0.0), np.zeros(1), discs, WALLS, 0.25, 2.0),
-        free_arcs((3.0, 3.0, math.pi), np.zeros(1), discs, WALLS, 0.25, 2.0),
-    )
-    assert towards[0] < 2e-3
-    assert away[0] == pytest.approx(2.0)
+    (towards,), (away,) = (free_arcs((3.0, 3.0, yaw), [0.0], discs, 0.25, 2.0) for yaw in (0.0, math.pi))
+    assert towards < 2e-3
+    assert away == pytest.approx(2.0)
 
 
 def test_dwa_chooses_only_velocities_from_which_it_can_stop():
     world = World("wall", EMPTY.bounds, (Disc(4.0, 2.0, 0.3),))
     path = path_of([(0.5, 2.0), (7.5, 2.0)], world)
     for x in np.linspace(3.0, 3.45, 10):
-        command, _ = DynamicWindow(margin=0.0).step(at((x, 2.0, 0.0), speed=0.2), path, WindowState(2.5, ROBOT.radius))
+        command, _ = DynamicWindow(margin=0.0).step(at((x, 2.0, 0.0), speed=0.2), path, 2.5)
         curvature = command.yaw_rate / command.speed if command.speed else 0.0
-        free = free_arcs((x, 2.0, 0.0), np.array([curvature]), world.discs, world.bounds, ROBOT.radius, 5.0)[0]
+        (free,) = free_arcs((x, 2.0, 0.0), [curvature], world.discs, ROBOT.radius, 5.0)
         assert command.speed <= math.sqrt(2 * free * ROBOT.max_acceleration) + 1e-9
 
 
 def test_dwa_sees_movers_as_discs_at_rest():
     mover = at((3.0, 2.0, 0.0))._replace(movers=MOVER)
-    free, _ = DynamicWindow().step(at((3.0, 2.0, 0.0)), LINE, WindowState(2.5, ROBOT.radius))
-    held, _ = DynamicWindow().step(mover, LINE, WindowState(2.5, ROBOT.radius))
+    free, _ = DynamicWindow().step(at((3.0, 2.0, 0.0)), LINE, 2.5)
+    held, _ = DynamicWindow().step(mover, LINE, 2.5)
     assert held.speed < free.speed
 
 

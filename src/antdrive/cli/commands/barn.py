@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @options.with_settings(
-    ("noise", *(name for name, one in SETTINGS.items() if one.setting.group == "Sensing")),
+    ("noise", "controller", *(name for name, one in SETTINGS.items() if one.setting.group == "Sensing")),
     noise=1.0,
     map="none",
     usual={"localisation": "matching; fixes with --map given"},

@@ -85,10 +85,7 @@ def compare(
     check_worlds(worlds)
     places = [ends.of(world) for world in worlds]
     entrants = entrants_of(planner, settings, robot, controller)
-    scenarios = {
-        label: [one.setup.scenario(place, given | one.controller) for place in places]
-        for label, one in entrants.items()
-    }
+    scenarios = {label: [one.scenario(place, given) for place in places] for label, one in entrants.items()}
     every = [scenario for several in scenarios.values() for scenario in several]
     names = list(dict.fromkeys(scenario.task.world.name for scenario in every))
     if len(names) < len(worlds):

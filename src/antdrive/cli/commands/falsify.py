@@ -15,7 +15,7 @@ from antdrive.runs.results_folder import mark_of
 MARKER = "falsify.json"  # identifies the search in its folder
 
 
-@options.with_settings(("smoothing", "noise", "margin", "cell", "seed"))
+@options.with_settings(("smoothing", "noise", "controller", "margin", "cell", "seed"))
 def falsify(
     *,
     budget: Annotated[int, option("NUMBER", "Maximum number of runs.", min=1, max=1_000_000)] = 100,

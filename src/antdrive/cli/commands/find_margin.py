@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 ASTAR = Setup(planner="astar")
 
 
-@options.with_settings(("footprint", "smoothing", "noise", "cell", "seed"))
+@options.with_settings(("footprint", "smoothing", "noise", "controller", "cell", "seed"))
 def find_margin(
     *,
     world: Annotated[str | None, argument("WORLD", "World name or file.")] = None,

@@ -27,6 +27,7 @@ def shrink(
         ),
     ] = None,
     planner: options.LogPlanner = None,
+    controller: options.LogController = None,
     seconds: Annotated[
         float, option("SECONDS", "Search time [s]; repeating the command continues.", min=1.0, max=1e6)
     ] = 60.0,
@@ -47,9 +48,10 @@ def shrink(
     from antdrive.runs.failures.reproducers import write_reproducer
     from antdrive.runs.failures.shrinker import shrink as make_small
 
-    if planner is not None and "::" in failure:
-        raise InputError(f"--planner: applies to logs only; the suite names the planner of {failure}")
-    scenario, case = failing(failure, planner, with_calibrated_margin)
+    for kind, given in (("planner", planner), ("controller", controller)):
+        if given is not None and "::" in failure:
+            raise InputError(f"--{kind}: applies to logs only; the suite names the {kind} of {failure}")
+    scenario, case = failing(failure, planner, controller, with_calibrated_margin)
     crossed = parse_bound(bound) if bound is not None else broken_bound(case, scenario)
     name = f"{scenario_name(scenario.task.world.name)}-small"
     mark = mark_of(scenario.key, str(crossed))
@@ -60,7 +62,7 @@ def shrink(
         small, suite, repeats = write_reproducer(shrunk, name, folder, bound=crossed)
         files = {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
         report: dict[str, Any] = {"files": files}
-        if small.run is not None:  # else the planner raises an error
+        if small.run is not None:  # else the planner or the controller raises an error
             files = {**write_run(small.run, folder, this_command(), figures=figures)["files"], **files}
             if film and small.rollout is not None:
                 files["film"] = film_drives([small.rollout], folder / f"{name}.mp4")["file"]

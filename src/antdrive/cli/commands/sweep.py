@@ -32,7 +32,8 @@ def sweep(
         list[str] | None,
         option(
             "GROUP.KEY=VALUES",
-            "Options of a planner (as.ants=10,50 or as.ants=10..50..20) or of all (planner.ants=50). Repeatable.",
+            "Options of a planner (as.ants=10,50 or as.ants=10..50..20), of all (planner.ants=50) or of controllers "
+            "(controller.reach=1,2). Repeatable.",
             "--set",
             "-s",
         ),

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import math
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
-from antdrive.base.components import ComponentError
+import numpy as np
+
+from antdrive.base.components import ComponentError, is_built_in
 from antdrive.base.guarded import value_text
 from antdrive.robots.control._kernels_pursuit import reachable_twist
-from antdrive.robots.control.observation import Briefing, ControllerCapabilities, Observation, Twist
+from antdrive.robots.control.observation import Briefing, ControllerCapabilities, Observation, Twist, finite_twist
 from antdrive.robots.control.pursuit import TrackedPath
+
+Arrays = TypeVar("Arrays", bound=Any)
 
 
 @runtime_checkable
@@ -53,12 +58,7 @@ def capabilities_of_controller(controller: Controller) -> ControllerCapabilities
     Raises:
         ControllerError: its attribute `capabilities` has another type, or raises an exception.
     """
-    with ControllerError.guard(controller):
-        declared: Any = getattr(controller, "capabilities", ControllerCapabilities())
-    if not issubclass(type(declared), ControllerCapabilities):
-        problem = f"declares {value_text(declared)} instead of ControllerCapabilities"
-        raise ControllerError(type(controller).__name__, problem)
-    return cast(ControllerCapabilities, declared)
+    return ControllerError.declared(controller, ControllerCapabilities())
 
 
 class Following:
@@ -66,8 +66,10 @@ class Following:
 
     def __init__(self, controller: Controller, name: str, briefing: Briefing) -> None:
         self._controller, self._name, self._briefing = controller, name, briefing
+        self._trusted = is_built_in(controller)
         self._route: object = None
         self._state: Any = None
+        self._given: tuple[TrackedPath, TrackedPath] | None = None  # the path, and the controller's own
 
     def command(self, now: Observation, path: TrackedPath) -> Twist:
         """Return the controller's command, limited to what the robot can reach in a period.
@@ -80,6 +82,8 @@ class Following:
         if path.backwards:
             ahead = self.command(_turned_round(now), dataclasses.replace(path, backwards=False))
             return Twist(-ahead.speed, ahead.yaw_rate)
+        if not self._trusted:
+            now, path = self._own(now, path)
         with ControllerError.guard(self._controller, self._name):
             if path.route is not self._route:
                 self._route, self._state = path.route, self._controller.start(self._briefing, path)
@@ -90,23 +94,30 @@ class Following:
         wanted = min(max(speed, -limits.speed), limits.speed), yaw_rate
         return Twist(*reachable_twist(*wanted, *now.command, 1 / self._briefing.hz, limits))
 
-    def _checked(self, answer: Any) -> tuple[float, float]:
-        """Return speed [m/s] and yaw rate [rad/s] of an answer (twist, state)."""
-        if not isinstance(answer, tuple) or len(answer) != 2:
-            raise self._error(f"returned {value_text(answer, 60)} instead of (Twist, state)")
-        twist = answer[0]
-        if not isinstance(twist, tuple) or len(twist) != 2:
-            raise self._error(f"returned the command {value_text(twist, 60)} instead of a Twist")
-        try:
-            speed, yaw_rate = map(float, twist)
-        except (TypeError, ValueError):
-            speed = yaw_rate = math.nan
-        if not (math.isfinite(speed) and math.isfinite(yaw_rate)):
-            raise self._error(f"returned {value_text(twist, 60)}; speed and yaw rate must be finite numbers")
-        return speed, yaw_rate
+    def _own(self, now: Observation, path: TrackedPath) -> tuple[Observation, TrackedPath]:
+        """Return copies, which user code may change without effect on anybody else."""
+        if self._given is None or self._given[0] is not path:
+            own = dataclasses.replace(path, samples=_copied(path.samples), obstacles=_copied(path.obstacles))
+            self._given = path, own
+        scan = None if now.scan is None else now.scan.copy()
+        return now._replace(movers=_copied(now.movers), scan=scan), copy.copy(self._given[1])
 
-    def _error(self, problem: str) -> ControllerError:
-        return ControllerError(self._name, f"{problem} ({ControllerError.place_of(self._controller)})")
+    def _checked(self, answer: Any) -> Twist:
+        """Return the command of an answer (twist, state)."""
+        wanted = "(Twist, state)"
+        if isinstance(answer, tuple) and len(answer) == 2:
+            answer, wanted = answer[0], "a Twist of two finite numbers"
+            if (twist := finite_twist(answer)) is not None:
+                return twist
+        problem = f"returned {value_text(answer, 60)} instead of {wanted}"
+        raise ControllerError(self._name, f"{problem} ({ControllerError.place_of(self._controller)})")
+
+
+def _copied(record: Arrays) -> Arrays:
+    """Return a named tuple with copies of its writable arrays; kernels are compiled for others as they are."""
+    arrays = {key: one for key, one in record._asdict().items() if isinstance(one, np.ndarray) and one.flags.writeable}
+    copied: Arrays = record._replace(**{key: one.copy() for key, one in arrays.items()})
+    return copied
 
 
 def _turned_round(now: Observation) -> Observation:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,17 @@ class Twist(NamedTuple):
 
     speed: float
     yaw_rate: float
+
+
+def finite_twist(command: Any) -> Twist | None:
+    """Return a command of two finite numbers, speed [m/s] and yaw rate [rad/s]; None for anything else."""
+    if not isinstance(command, tuple | list | np.ndarray):
+        return None
+    try:
+        speed, yaw_rate = (math.nan if isinstance(one, str | bytes) else float(one) for one in command)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return Twist(speed, yaw_rate) if math.isfinite(speed) and math.isfinite(yaw_rate) else None
 
 
 class Movers(NamedTuple):

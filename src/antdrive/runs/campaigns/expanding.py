@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import itertools
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -16,10 +15,18 @@ from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, amount
 from antdrive.base.files import file_name
 from antdrive.robots import list_robots, load_robot
+from antdrive.robots.controllers.registry import REGISTRY
 from antdrive.runs.campaigns.campaign import AXES, Campaign
 from antdrive.runs.campaigns.job import Job, NamedRobot, NamedTask, PlannerVariant, SweepCase
-from antdrive.runs.campaigns.resolving import OWN, SKIP, campaign_tasks, campaign_worlds, planner_variants
-from antdrive.sim.forms import scenario_fields
+from antdrive.runs.campaigns.resolving import (
+    OWN,
+    SKIP,
+    campaign_tasks,
+    campaign_worlds,
+    component_of,
+    planner_variants,
+)
+from antdrive.sim.forms import name_and_options, scenario_fields
 from antdrive.sim.idle_settings import idle_notes
 from antdrive.sim.log.record import canonical_hash
 from antdrive.sim.scenario import Scenario, key_of
@@ -40,7 +47,7 @@ class Expansion:
     counts: dict[str, int]  # numbers of worlds, tasks in each world, robots and other axes, by name
     worlds: dict[str, Task]  # world files named by the runs' commands, by path relative to the campaign's folder
     robots: dict[str, Path]  # robot files, likewise
-    planners: dict[str, Path]  # files of custom planners, likewise
+    codes: dict[str, Path]  # files of custom planners and controllers, likewise
     remarks: tuple[str, ...]  # sentences about skipped problems, maps' unknown cells and the floor of random tasks
 
     def idle_notes(self) -> list[str]:
@@ -105,7 +112,10 @@ def expand(campaign: Campaign) -> Expansion:
     }
     wanted = len(tasks) * len(robots) * len(settings) * len(planners) * len(campaign.entry.seeds)
     own = {one.word: one.file for one in robots if one.file is not None}
-    codes = {one.word.rpartition(":")[0]: one.file for one in planners if one.file is not None}
+    names = dict.fromkeys(name_and_options(given.get("controller"))[0] for given, _ in settings)
+    controllers = [component_of(name, campaign.folder, REGISTRY) for name in names]
+    files_of_code = [(one.word, one.file) for one in planners] + [(one.word, one.file) for one in controllers]
+    codes = {word.rpartition(":")[0]: file for word, file in files_of_code if file is not None}
     return Expansion(
         tuple(jobs.values()), wanted - len(jobs), counts, files, own, codes, tuple(_remarks(tasks, skipped))
     )
@@ -162,17 +172,11 @@ def _settings(campaign: Campaign) -> list[tuple[dict[str, Any], Location]]:
     combinations = []
     for *values, (settings, place) in itertools.product(*map(campaign.values, AXES), listed):
         given = {**settings, **dict(zip(keys, values, strict=True))}
-        given = dict(with_controller(given, functools.partial(_located, campaign.folder)))
         with placed(campaign.at(*place)):
+            given = dict(with_controller(given, lambda name: component_of(name, campaign.folder, REGISTRY).source))
             scenario_fields(given)
         combinations.append((given, place))
     return combinations
-
-
-def _located(folder: Path, name: str) -> str:
-    """Return the name of a component with the whole path of a user's file, relative to a folder."""
-    file, mark, word = name.rpartition(":")
-    return f"{(folder / file).absolute()}{mark}{word}" if file.endswith(".py") else name
 
 
 #: Locations in a campaign of a scenario's fields, where the names differ.
@@ -215,8 +219,9 @@ def _case(
     task: NamedTask, content: str, world: str, robot: NamedRobot, given: dict[str, Any], planner: PlannerVariant
 ) -> SweepCase:
     """Return a configuration, with the canonical hash of its task and the world's name in commands."""
-    written = Written(world=world, planner=planner.word, options=planner.given, robot=robot.word, settings=given)
-    return SweepCase(place=task, world_hash=content, planner=planner, robot=robot, written=written)
+    words = with_controller(given, lambda name: component_of(name, Path(), REGISTRY).word)
+    written = Written(world=world, planner=planner.word, options=planner.given, robot=robot.word, settings=words)
+    return SweepCase(place=task, world_hash=content, planner=planner, robot=robot, written=written, settings=given)
 
 
 def _cases(

@@ -84,6 +84,7 @@ class SweepCase:
         planner: the planner with its options
         robot: the robot
         written: the configuration in the words of a command run in the campaign's folder
+        settings: its settings, with the controller's file where the campaign has it
         calibration: calibration of the margin "auto"; None: not calibrated yet, or the margin is a number
     """
 
@@ -92,6 +93,7 @@ class SweepCase:
     planner: PlannerVariant
     robot: NamedRobot
     written: Written
+    settings: Mapping[str, Any]
     calibration: Calibration | None = None
 
     def scenario(self, seed: int, choose: Callable[[Scenario], Scenario] | None = None) -> Scenario:
@@ -112,7 +114,7 @@ class SweepCase:
                 else with_chosen_margin
             )
         planner = load_planner(self.planner.source, **self.planner.given)
-        words = dataclasses.replace(self.written, seed=seed)
+        words = dataclasses.replace(self.written, settings=self.settings, seed=seed)
         return words.scenario(choose=choose, task=self.place.task, planner=planner, robot=self.robot.robot)
 
     @functools.cached_property

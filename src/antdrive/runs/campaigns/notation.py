@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from antdrive.base.errors import InputError
 from antdrive.base.user_code import record_name
 from antdrive.robots import list_robots
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
+from antdrive.sim.forms import USUAL_CONTROLLER
 from antdrive.sim.settings import SETTINGS
 from antdrive.worlds import list_worlds
 
@@ -20,6 +22,7 @@ OPTIONS = {one.key: one.flag for one in SETTINGS.values() if one.flag} | {
     "robots": "--robot",
     "seeds": "--seeds",
 }
+CONTROLLER = "controller"  # its key, and group of `--set`
 SOURCE = "the options"  # name of a campaign without a file in error messages
 
 
@@ -45,10 +48,12 @@ def campaign_from(path: Path | None, settings: Mapping[str, Any], **words: Any) 
     file = load_campaign(path)
     # Paths in options are relative to the working directory, those in the file to the file.
     if "planners" in given:
-        given["planners"] = [_absolute_planner(one) for one in given["planners"]]
+        given["planners"] = [_absolute_code(one) for one in given["planners"]]
     for key in ("worlds", "robots"):
         given[key] = _absolute(given[key]) if key in given else file.document.data.get(key)
     if "settings" in given:
+        if CONTROLLER in given["settings"]:
+            given["settings"][CONTROLLER] = [*map(_absolute_code, given["settings"][CONTROLLER])]
         own, others = file.document.data.get("settings", {}), given["settings"]
         given["settings"] = [{**one, **others} for one in own] if isinstance(own, list) else {**own, **others}
     merged = {**file.document.data, **{key: value for key, value in given.items() if value is not None}}
@@ -58,11 +63,16 @@ def campaign_from(path: Path | None, settings: Mapping[str, Any], **words: Any) 
 def _keys(words: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the campaign keys given by options."""
     axes = {one.key for one in SETTINGS.values() if one.setting.axis}
+    options = words["options"] or ()
+    of_planners = [text for text in options if not text.startswith(f"{CONTROLLER}.")]
+    if len(of_planners) < len(options):
+        names = settings.get(CONTROLLER, [USUAL_CONTROLLER])
+        settings = {**settings, CONTROLLER: _controllers(names, [text for text in options if text not in of_planners])}
     keys = {key: value for key, value in settings.items() if key in axes}
     keys |= {
         "robots": words["robots"],
         "worlds": [*(words["worlds"] or ()), *(_generated(text) for text in words["generate"] or ())],
-        "planners": _planners(words["planners"] or (), words["options"] or ()),
+        "planners": _planners(words["planners"] or (), of_planners),
         "settings": {key: value for key, value in settings.items() if key not in axes},
         "seeds": None if words["seeds"] is None else _seeds(words["seeds"]),
         "run_limit": words["run_limit"],
@@ -86,10 +96,10 @@ def _absolute(worlds: list[Any]) -> list[Any]:
     return [str(Path(one).absolute()) if isinstance(one, str) and one not in known else one for one in worlds]
 
 
-def _absolute_planner(entry: Any) -> Any:
-    """Return a planner with its file's path, if any, made absolute."""
+def _absolute_code(entry: Any) -> Any:
+    """Return a planner or controller with its file's path, if any, made absolute."""
     if isinstance(entry, dict):
-        return {**entry, "name": _absolute_planner(entry["name"])}
+        return {**entry, "name": _absolute_code(entry["name"])}
     file, mark, word = entry.rpartition(":")
     return f"{Path(file).absolute()}{mark}{word}" if file.endswith(".py") else entry
 
@@ -121,7 +131,7 @@ def _planners(names: Sequence[str], settings: Sequence[str]) -> list[Any]:
             )
     options: dict[str, dict[str, Any]] = {name: {} for name in names}
     for text in settings:
-        group, key, values = grouped(text, (*map(record_name, names), "planner"))
+        group, key, values = grouped(text, (*map(record_name, names), "planner", CONTROLLER))
         ends = values.split("..")
         given: Any = values.split(",") if "," in values else values
         if len(ends) == 3:
@@ -130,6 +140,13 @@ def _planners(names: Sequence[str], settings: Sequence[str]) -> list[Any]:
             if group in ("planner", record_name(name)):
                 options[name][key] = given
     return [{"name": name, **given} if given else name for name, given in options.items()]
+
+
+def _controllers(names: Sequence[str], settings: Sequence[str]) -> list[dict[str, Any]]:
+    """Parse the setting `controller` from names and `--set controller.KEY=VALUES`: every combination."""
+    pairs = [grouped(text, (CONTROLLER,))[1:] for text in settings]
+    values = itertools.product(names, *(text.split(",") for _, text in pairs))
+    return [{"name": name, **dict(zip((key for key, _ in pairs), given, strict=True))} for name, *given in values]
 
 
 def _number(option: str, text: str, *, whole: bool = False) -> float | int:

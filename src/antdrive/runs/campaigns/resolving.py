@@ -8,7 +8,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,10 @@ from antdrive.base.checks import show, suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import relative
+from antdrive.base.registry import Registry
 from antdrive.base.user_code import label_names
-from antdrive.planners import PLANNERS, Query, capabilities_of, load_planner, planner_version
+from antdrive.planners import PLANNERS, Query, capabilities_of, load_planner
+from antdrive.planners.registry import REGISTRY
 from antdrive.robots import PurePursuit, RobotSpec, outline_of, overlap_at
 from antdrive.robots.default_margin import LEAST, default_margin
 from antdrive.runs.campaigns.campaign import Campaign, RandomTasks, seeds_of
@@ -161,7 +163,31 @@ def _problems(campaign: Campaign, place: Location, entry: dict[str, Any]) -> lis
 
 
 MOST_VALUES = 10_000  # in one range
-PLANNER_FILES = "planners"  # subfolder with the planner files that commands name
+
+
+class NamedComponent(NamedTuple):
+    """A planner or controller under its names."""
+
+    name: str  # as in the campaign; for a file without its folder
+    source: str  # what loads it
+    word: str  # its name in commands run in the campaign's folder, which has a copy of its file
+    file: Path | None  # its file; None if registered or in a module
+    version: str  # version of its code
+
+
+def component_of(name: str, folder: Path, registry: Registry[Any]) -> NamedComponent:
+    """Return a component that a campaign in a folder names.
+
+    Raises:
+        InputError: it cannot be loaded.
+    """
+    file, _, inner = name.rpartition(":")
+    if not file.endswith(".py"):
+        return NamedComponent(name, name, name, None, registry.version(name))
+    path = (folder / file).absolute()
+    source, name = f"{path}:{inner}", f"{path.name}:{inner}"
+    version = registry.version(source)
+    return NamedComponent(name, source, f"{registry.kind}s/{version.rpartition(' ')[2]}/{name}", path, version)
 
 
 def planner_variants(campaign: Campaign) -> list[PlannerVariant]:
@@ -185,15 +211,9 @@ def _variants(campaign: Campaign, place: Location, options: dict[str, Any]) -> I
     given_name = options.pop("name", None)
     if not isinstance(given_name, str):
         raise campaign.error((*place, "name"), "missing; write the planner's name, such as {name: aco-han, ants: 50}")
-    file, _, inner = given_name.rpartition(":")
-    path = (campaign.folder / file).absolute() if file.endswith(".py") else None
-    source = given_name if path is None else f"{path}:{inner}"
-    name = given_name if path is None else f"{path.name}:{inner}"
-
     at = campaign.at(*place, skip=1)
     with placed(at):
-        version = planner_version(source)
-    word = name if path is None else f"{PLANNER_FILES}/{version.rpartition(' ')[2]}/{name}"
+        name, source, word, path, version = component_of(given_name, campaign.folder, REGISTRY)
     lists = [values_of(campaign, (*place, key), value) for key, value in options.items()]
     for values in itertools.product(*lists):
         given = dict(zip(options, values, strict=True))

@@ -4,7 +4,7 @@
     grid.parquet    a row for each run: its configuration and seed
     parts/          results: a new file every few seconds, merged from time to time
     rollouts/       the logs that are kept
-    worlds/, robots/  files for the commands that repeat runs
+    worlds/, robots/, planners/, controllers/  files for the commands that repeat runs
     runs.parquet    the table of all finished runs, written at the start and the end of a command
 
 Every file is written under a temporary name, synced to the disk and renamed, so a killed process leaves no partial

@@ -250,11 +250,11 @@ def _manifest(campaign: Campaign, expansion: Expansion) -> dict[str, Any]:
 
 
 def _begin(store: Store, expansion: Expansion, jobs: Sequence[Job]) -> None:
-    """Write the files of worlds, robots and planners that the runs' commands name, and the grid."""
+    """Write the files of worlds, robots, planners and controllers that the runs' commands name, and the grid."""
     for path, task in expansion.worlds.items():
         if not (store.folder / path).exists():
             save_task(task, store.folder / path)
-    for path, source in {**expansion.robots, **expansion.planners}.items():
+    for path, source in {**expansion.robots, **expansion.codes}.items():
         with atomic_write(store.folder / path) as part:
             shutil.copyfile(source, part)
     store.begin(grid_table(jobs))

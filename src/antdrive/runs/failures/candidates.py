@@ -15,8 +15,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import MAX_JSON_BYTES, parse_json, read_bytes
 from antdrive.base.user_code import is_importable_elsewhere
 from antdrive.base.version import versions
-from antdrive.planners import Planner
-from antdrive.runs.failures.failure import Attempt, Failure, failure_of, failure_of_planner
+from antdrive.runs.failures.failure import Attempt, Failure, failure_of, failure_of_error
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
 from antdrive.sim.log.outcome import Outcome
@@ -40,7 +39,7 @@ def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = 
         grid, answer = plan(scenario)
         return None if answer.solved else failure_of(Run(scenario, grid, answer), bound)
     except ComponentError as error:
-        return None if bound is not None else failure_of_planner(error)
+        return None if bound is not None else failure_of_error(error)
     except (FieldError, InputError):  # such as a wanderer without a free cell in a smaller world
         return None
 
@@ -149,7 +148,8 @@ class CandidateRunner:
     def _run(self, candidates: list[Scenario]) -> Iterator[bool]:
         drive = self._wanted.outcome not in {outcome.key for outcome in ENDED_BY.values()}
         tried = functools.partial(failure_in, bound=self._bound, drive=drive)
-        if len(candidates) == 1 or not is_importable_elsewhere(candidates[0].planner):
+        own = candidates[0].planner, candidates[0].controller
+        if len(candidates) == 1 or not all(map(is_importable_elsewhere, own)):
             failures = [tried(candidate) for candidate in candidates]
         else:
             failures = list(self._pool.results(tried, candidates))
@@ -160,16 +160,16 @@ class CandidateRunner:
 
 
 def identity_of(scenario: Scenario) -> str:
-    """Return a text that is equal for equal scenarios, also with planners that are no records."""
-    return f"{scenario.key} {_text_of(scenario.planner)}"
+    """Return a text that is equal for equal scenarios, also with planners and controllers that are no records."""
+    return f"{scenario.key} {_text_of(scenario.planner)} {_text_of(scenario.controller)}"
 
 
-def _text_of(planner: Planner) -> str:
-    """Return a planner as text, by class and attributes if its `repr` is the default, whose address differs per process."""
-    kind = type(planner)
+def _text_of(component: object) -> str:
+    """Return a component as text, by class and attributes if its `repr` is the default, whose address differs per process."""
+    kind = type(component)
     if kind.__repr__ is not object.__repr__:
-        return repr(planner)
-    return f"{kind.__module__}.{kind.__qualname__}({sorted(vars(planner).items()) if hasattr(planner, '__dict__') else ''})"
+        return repr(component)
+    return f"{kind.__module__}.{kind.__qualname__}({sorted(getattr(component, '__dict__', {}).items())})"
 
 
 def _read(journal: Path | None, header: str) -> dict[str, bool]:

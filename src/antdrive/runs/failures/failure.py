@@ -13,7 +13,7 @@ from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import CYLINDER, UNSEEN, WALL, Bound
-from antdrive.runs.suites.evaluation import RAISED, evaluate, limits, unmet_demands
+from antdrive.runs.suites.evaluation import evaluate, limits, unmet_demands
 from antdrive.runs.suites.nearest import NOTHING, cause_of_contact, first_contact_kind
 from antdrive.runs.suites.scenarios import scenario_of, select
 from antdrive.runs.suites.suite import SUFFIX, SuiteCase
@@ -52,7 +52,7 @@ class Failure:
 
     Attributes:
         outcome: key of the run's outcome, such as collided; succeeded for a drive that reaches the goal but is not
-            certified or crosses a bound; planner_error if the planner raised an error
+            certified or crosses a bound; planner_error or controller_error if that raised an error
         touched: thing of the first contact: cylinder, unseen cylinder, mover, wall, or nothing
         cause: for contacts with walls and known cylinders, the largest contribution to the lost margin until then (a
             key of `antdrive.sim.log.margin.CAUSES`); for a refused certificate the failed check; for a bound the bound;
@@ -122,13 +122,14 @@ def bound_broken_in(case: SuiteCase, done: Run) -> Bound | None:
 
 
 def failing(
-    words: str, planner: str | None, choose: Callable[[Scenario], Scenario]
+    words: str, planner: str | None, controller: str | None, choose: Callable[[Scenario], Scenario]
 ) -> tuple[Scenario, SuiteCase | None]:
     """Return the scenario of a log, or of a test of a suite with the test.
 
     Args:
         words: a log, a run's folder, or SUITE::SCENARIO
         planner: class of the log's planner as FILE.py:CLASS, if it is not registered
+        controller: the same of its controller
         choose: chooses the margin `auto`
 
     Raises:
@@ -143,7 +144,7 @@ def failing(
         raise InputError(f"{words}: is a suite; name one of its tests: {words}::SCENARIO")
     words = str(log_at(Path(words)))
     try:
-        return rebuilt(read_record(words), planner), None
+        return rebuilt(read_record(words), planner, controller), None
     except InputError as error:
         raise error if str(error).startswith(words) else input_error(words, str(error)) from None
 
@@ -167,8 +168,8 @@ class Attempt:
 
     Attributes:
         scenario: the scenario
-        run: its run; None if the planner raised an error
-        error: the planner's error, if any
+        run: its run; None if the planner or the controller raised an error
+        error: their error, if any
     """
 
     scenario: Scenario
@@ -190,19 +191,22 @@ class Attempt:
 
     @property
     def fingerprint(self) -> str:
-        """Text that is equal for bitwise equal runs, or for equal errors of the planner."""
+        """Text that is equal for bitwise equal runs, or for equal errors."""
         if self.run is None:
             return without_numbers(str(self.error))
         return f"{self.run.outcome.key}: {self.run.reason}" if self.run.rollout is None else self.run.rollout.digest
 
     def failure(self, bound: Bound | None = None) -> Failure | None:
-        """Return how it failed, by `failure_of`; an error of the planner is a failure for any bound."""
-        return failure_of_planner(self.error) if self.run is None else failure_of(self.run, bound)
+        """Return how it failed, by `failure_of`; an error is a failure for any bound."""
+        if self.run is not None:
+            return failure_of(self.run, bound)
+        assert self.error is not None
+        return failure_of_error(self.error)
 
 
-def failure_of_planner(error: ComponentError | None) -> Failure:
-    """Return the failure of a run that ended in an error of the planner."""
-    return _with_reason(RAISED, NOTHING, str(error))
+def failure_of_error(error: ComponentError) -> Failure:
+    """Return the failure of a run that ended in an error of the planner or the controller."""
+    return _with_reason(f"{error.kind}_error", NOTHING, str(error))
 
 
 def _with_reason(outcome: str, touched: str, reason: str) -> Failure:

@@ -225,8 +225,6 @@ _WORDS = {
 #: Metrics at the beginning of messages.
 FIRST = ("contacts_driving", "min_clearance_m", "duration_s", "driven_length_m")
 _PLACED = ("min_clearance_m",)
-#: The outcome of a test whose planner raised an error.
-RAISED = "planner_error"
 ROUNDED = 1e-6  # the last decimal of a baseline's metrics
 
 
