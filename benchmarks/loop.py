@@ -33,7 +33,7 @@ from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import follow
 from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.perceived_movers import Given
+from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.driving.replanning import Replanning
 from antdrive.sim.driving.rules import Avoid
@@ -101,7 +101,7 @@ def table_of_movers(route: Route, rounds: int) -> None:
                 (f"{MOVERS} movers, not seen", full, moving),
                 (f"{MOVERS} movers, avoided", full, moving),
             ):
-                told, sense = Given(Perception(), 60, len(motions)), MoverSense(motions, Perception(), 60)
+                told, sense = PerceivedMovers(Perception(), len(motions)), MoverSense(motions, Perception(), 60)
                 avoid = Avoid(Avoidance(), told, task, robot, 60)
                 started = time.process_time()
                 rules = [avoid] if name.endswith("avoided") else []

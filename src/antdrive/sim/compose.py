@@ -21,7 +21,7 @@ from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.perceived_movers import Given, PerceivedMovers, Tracked
+from antdrive.sim.driving.perceived_movers import PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.route_planner import RoutePlanner
 from antdrive.sim.driving.routes import OneRoute
@@ -85,14 +85,15 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
     survey = _survey(s, briefing, tracks_movers) if mapless else None
     scans = _mover_detector(s) if not mapless and tracks_movers else survey
     tracking = scans.tracking if scans else None
-    given = Given(perception, hz, briefing.movers, briefing.motions)
-    movers: PerceivedMovers = Tracked(tracking, perception, hz) if tracking else given
+    movers = PerceivedMovers(perception, briefing.movers, briefing.motions)
+    if tracking:
+        movers = Tracked(tracking, perception)
     # A scan may be one scan period old, and commands are delayed.
     reaction = 1 / hz + (1 / _lidar(s).rate if scans else 0.0) + s.robot.noise.scaled(s.noise).delay
     rules: list[Rule] = [_follow(s, briefing, movers)]
     guide: RouteGuide
     if survey:
-        guide = exploration = _exploration(s, survey)
+        guide = exploration = _exploration(s, survey, movers)
         rules.append(TurnToScan(s.robot, hz))
     else:
         guide = _guide(s, movers, moving)
@@ -115,7 +116,7 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
         )  # fmt: skip
     if survey:
         rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_command))
-    return guide, Driver(briefing, guide, rules, scans, given)
+    return guide, Driver(briefing, guide, rules, scans, movers)
 
 
 def perception_of(s: Scenario) -> Perception:
@@ -181,13 +182,12 @@ def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
     return kind(route_planner(s), policy, movers, s.robot.radius + avoidance.min_clearance if avoidance else 0.0)
 
 
-def _exploration(s: Scenario, survey: Survey) -> Exploration:
+def _exploration(s: Scenario, survey: Survey, movers: PerceivedMovers) -> Exploration:
     """Create the guide of a mapless robot; it plans around tracked movers if the policy says so."""
     policy, ahead = s.replanning, None
     assert policy is not None  # `Scenario` checks that a mapless robot replans
-    if survey.tracking is not None and policy.around_movers:
-        tracked = Tracked(survey.tracking, perception_of(s), s.control_hz)
-        ahead = MoversSeenAhead(tracked, survey, policy, s.robot, s.task.goal, s.inflate, s.control_hz)
+    if isinstance(movers, Tracked) and policy.around_movers:
+        ahead = MoversSeenAhead(movers, survey, policy, s.robot, s.task.goal, s.inflate)
     return Exploration(route_planner(s), survey, policy, ahead)
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from antdrive.base import FieldError
 from antdrive.planners import Query, load_planner, smooth
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, Noise, PurePursuit, PursuitState, Twist, load_robot
-from antdrive.robots.control.observation import Briefing, Observation
+from antdrive.robots.control.observation import NOBODY, Briefing, Observation
 from antdrive.robots.noise import moved_by
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
@@ -195,7 +195,7 @@ def test_a_mover_beside_the_goal_closes_no_cell_within_the_inflation_of_it():
             mover = Keyframed(radius=0.5, keyframes=((0.0, x, y), (9.0, x, y)))
             still = GroundTruth(Trajectories.of(World("w", HALL.bounds, movers=(mover,)), (1.0, 3.0)), Perception(), 60)
             grid = hall_grid()
-            discs = covered_discs(still, 0, np.array([(1.0, 3.0), goal]), 0.0, grid)
+            discs = covered_discs(still, np.array([(1.0, 3.0), goal]), 0.0, grid)
             assert discs
             assert discs[0].radius == pytest.approx(0.6 - grid.inflate - grid.cell)
             assert not blocked_cells(grid, discs)[grid.cell_at(*goal)]
@@ -253,6 +253,7 @@ def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, tu
         noted = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
         monkeypatch.setattr("antdrive.sim.compose.avoidance_of", lambda _, noted=noted: noted)
         rule = next(rule for rule in compose(unknown)[2].rules if type(rule) is Avoid)
+        rule._movers.read(seen())
         rule.apply(Moment(seen(), driver(robot).way, Step(), StuckClock()), Step())
         slow = robot is jackal and perception.kind == "lidar"
         assert asked == [BLIND_SHARE * robot.max_speed if slow else math.inf]
@@ -304,7 +305,7 @@ def test_movers_close_neither_the_robots_position_nor_the_goal():
     predictor = GroundTruth(Trajectories.of(world, TASK.start[:2]), Perception(), 60)
     grid = hall_grid()
     ends = np.array([TASK.start[:2], TASK.goal])
-    discs = covered_discs(predictor, 0, ends, 1.0, grid)
+    discs = covered_discs(predictor, ends, 1.0, grid)
     blocked = blocked_cells(grid, discs)
     for end in ends:
         assert not blocked[grid.cell_at(*end)]
@@ -356,7 +357,7 @@ def test_stopping_takes_as_long_as_the_slower_of_speed_and_turn(turtlebot):
 
 def test_a_robot_that_gives_way_is_not_stuck(turtlebot):
     none = np.empty((0, 2))
-    nobody = SimpleNamespace(predict=lambda *_: (np.stack([none, none]), np.empty(0)), velocities=lambda *_: none)
+    nobody = SimpleNamespace(predict=lambda *_: np.stack([none, none]), near=NOBODY)
     cautious = SimpleNamespace(
         prediction_times=np.array([0.0, 0.1]),
         step=0.1,

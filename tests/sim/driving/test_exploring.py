@@ -33,6 +33,7 @@ from antdrive.sim.sensing import Scanner
 from antdrive.views.map_reconstruction import MapReconstruction
 from antdrive.worlds import Cruising, Disc, Route, Task, World, generate, load_task, rasterise
 from tests.records import changed
+from tests.sim.driving.ground_truth import moment
 from tests.worlds.oracles import segment_distances
 
 POSTS = tuple(Disc(3.0, 0.15 * k, 0.075) for k in range(14))  # a row that leaves a gap at the top
@@ -405,7 +406,7 @@ def test_plans_that_failed_long_ago_are_no_reason(jackal):
     exploration.survey.map.discs = lambda bounds: closed
     said = []
     for tick in (60, 90, 120):
-        assert exploration.replan(tick, TASK.start, "no way") is None
+        assert exploration.replan(moment(tick, TASK.start), "no way") is None
         said.append(exploration.failure_note(tick))
     assert said == ["", "", "no way through what was seen, last at t = 2.0 s"]
     assert exploration.failure_note(120 + 30 * 60)
@@ -520,7 +521,7 @@ def test_a_robot_without_a_path_at_the_end_of_its_route_keeps_searching_for_a_wh
     robot = Driver(Briefing(jackal, task.start, task.goal, task.goal_tolerance, 60), exploration, ())
     robot.way = Follow(tracked)
     asked = []
-    exploration.replan = lambda tick, pose, trigger: asked.append(trigger)
+    exploration.replan = lambda now, trigger: asked.append(trigger)
     exploration.lost = lost
     robot.step = Step(pursuit=PursuitState(arc=tracked.length))
     exploration.trigger = lambda *_: ""

@@ -11,7 +11,7 @@ from antdrive.sim.driving.driver import Driver, full_turn
 from antdrive.sim.driving.guide import Follow, Guide, Rule
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import Ending
-from antdrive.sim.driving.perceived_movers import Given
+from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.plants import Bullet, Drive
 from antdrive.sim.driving.rules import Pursuit
 from antdrive.sim.driving.senses import MoverSense, Senses
@@ -47,14 +47,14 @@ def follow(
     senses: Senses | None = None,
     localiser: Exact | None = None,
     rules: Sequence[Rule] = (),
-    movers: tuple[MoverSense, Given] | None = None,
+    movers: tuple[MoverSense, PerceivedMovers] | None = None,
     progress: Progress = ignore_progress,
 ) -> Drive:
     """Drive along a path from the start of a task, for at most `limit` [s]; `rules` apply after pursuit."""
     pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))
     sense, given = movers or (None, None)
     known = Briefing(engine.robot, task.start, task.goal, task.goal_tolerance, control_hz, task.world)
-    driver = Driver(known, Guide(), (pursuit, *rules), given=given)
+    driver = Driver(known, Guide(), (pursuit, *rules), movers=given)
     driver.way = Follow(path)
     plant = Bullet(engine, task.start, control_hz)
     localiser = localiser or Exact(task.start, 1 / control_hz)

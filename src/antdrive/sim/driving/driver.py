@@ -12,7 +12,7 @@ from antdrive.robots.control.observation import Briefing, Observation
 from antdrive.robots.noise import moved_by
 from antdrive.sim.driving.guide import Follow, GiveUp, Guide, Moment, Rule, Wait
 from antdrive.sim.driving.parts import EXPLORING_LIMITERS, Ending, Note, Rows, Step, StuckClock
-from antdrive.sim.driving.perceived_movers import Given
+from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.rules import WAITING_SPEED
 from antdrive.sim.driving.survey import Scans
 from antdrive.sim.log.ending import STUCK_TIME, arrived, stopped
@@ -42,10 +42,10 @@ class Driver:
         guide: Guide,
         rules: Sequence[Rule],
         scans: Scans | None = None,
-        given: Given | None = None,
+        movers: PerceivedMovers | None = None,
     ) -> None:
         self.briefing, self.guide, self.rules, self.scans, self.step = briefing, guide, tuple(rules), scans, Step()
-        self._given, self._clock, self._hz = given, StuckClock(), briefing.hz
+        self._movers, self._clock, self._hz = movers, StuckClock(), briefing.hz
         self._patience = round(STUCK_TIME * briefing.hz)
         self._full_turn = full_turn(briefing.robot, briefing.hz)
         self.progress_periods = briefing.hz // PROGRESS_HZ or 1
@@ -60,14 +60,14 @@ class Driver:
         guide, known, before, believed = self.guide, self.briefing, self.step, now.pose
         if now.scan is not None and self.scans is not None:
             believed = self.scans.read(now.tick, believed, now.scan)
-        if self._given is not None:
-            self._given.read(now.movers)
         silent = Note(believed)
         if now.tick and arrived(believed, now.twist, before.command, known.goal, known.tolerance):
             return None, silent
         pose = moved_by(believed, now.pending, 1 / self._hz)
         waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
         seen = now._replace(pose=pose)
+        if self._movers is not None:
+            self._movers.read(seen)
         moment = Moment(seen, self.way, before, self._clock, waiting)
         answer = guide.path(moment)
         if isinstance(answer, GiveUp):

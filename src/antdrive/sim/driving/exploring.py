@@ -23,7 +23,7 @@ from antdrive.robots.control.pursuit import obstacles_around
 from antdrive.robots.default_margin import mapless_margins
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
-from antdrive.sim.driving.guide import Follow, RouteGuide, Wait
+from antdrive.sim.driving.guide import Follow, Moment, RouteGuide, Wait
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
 from antdrive.sim.driving.parts import Rows, table_logged
 from antdrive.sim.driving.recovery import TRAIL, Recovery
@@ -163,26 +163,26 @@ class Exploration(RouteGuide):
         robot = self._robot
         return rasterise(task.world, self._routes.cell, robot.radius + margin, outline_of(robot.footprint, margin))
 
-    def _plan_around(self, tick: int, pose: Pose, trigger: str) -> tuple[Grid, PlanResult, list[Disc]]:
+    def _plan_around(self, pose: Pose, trigger: str) -> tuple[Grid, PlanResult, list[Disc]]:
         """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""
         movers = self._movers
         if movers is None:
             return (*self.plan(pose), [])
-        if movers.heavy(tick, pose):
+        if movers.heavy:
             task = self._known(pose, movers.bounds(self._bounds(GROWTH[0], pose)))
             grid = self._grid(task, self._routes.margin)
-            zones, soon = movers.zones(tick, pose, grid), movers.discs(tick, pose)
-            around = movers.plan_around_zones(pose, zones, soon, functools.partial(self._routes.around, task, grid))
+            zones, soon = movers.zones(grid), movers.discs()
+            around = movers.plan_around_zones(zones, soon, functools.partial(self._routes.around, task, grid))
             if around is not None:
                 return (grid, *around)
-        discs = movers.discs(tick, pose)
+        discs = movers.discs()
         if discs:
             grid, answer = self.plan(pose, discs)
             # Only for the footprint, whose detours have turns on the spot. For the disc the rule saves time on average, but
             # some waits take twice the detour, and robots stay near movers that turn back for longer.
             if answer.solved and grid.turns:
                 free, speed = self.plan(pose), self._robot.max_speed
-                if movers.waiting_is_quicker(tick, pose, trigger, speed, answer.cost, free[1].cost):
+                if movers.waiting_is_quicker(trigger, speed, answer.cost, free[1].cost):
                     return (*free, [])
             if answer.solved:
                 return grid, answer, discs
@@ -265,29 +265,29 @@ class Exploration(RouteGuide):
         discs = self.survey.map.discs((x - near, y - near, x + near, y + near))
         return path.with_obstacles(obstacles_around(np.array((x, y)), discs, path.obstacles.bounds))
 
-    def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
+    def trigger(self, now: Moment) -> str:
         """Return the trigger of a new route; empty if none is due."""
-        now = tick / self._hz
+        t, pose, tracked, arc = now.observed.t, now.pose, now.way.path, now.before.pursuit.arc
         if self._movers is not None:
-            self._movers.observe(tick, pose, waiting)
+            self._movers.observe(now.waiting)
         recovery = self._recovery
         if recovery.scan_turn is not None:
             return Trigger.SCAN_TURN if recovery.scan_turn.done else ""
         if self.lost:
-            return Trigger.LOST if now - self._planned_at >= INTERVAL else ""
+            return Trigger.LOST if t - self._planned_at >= INTERVAL else ""
         turns = tracked.route.turns is not None
-        recovery.note_progress(now, pose, waiting=waiting, backwards=tracked.backwards, turns=turns)
+        recovery.note_progress(t, pose, waiting=now.waiting, backwards=tracked.backwards, turns=turns)
         if tracked.route is recovery.route:
-            over = tracked.length - arc < 2 * TRAIL or recovery.stalled(now)
+            over = tracked.length - arc < 2 * TRAIL or recovery.stalled(t)
             return (Trigger.BACKED_OFF if tracked.backwards else Trigger.MADE_ROOM) if over else ""
-        if now - self._planned_at < INTERVAL:
+        if t - self._planned_at < INTERVAL:
             return ""
-        if recovery.stalled(now):
+        if recovery.stalled(t):
             return Trigger.STALLED
-        if recovery.held(now, pose):
+        if recovery.held(t, pose):
             return Trigger.CONSTRAINED
-        if self._movers is not None and now - self._planned_at >= self._policy.min_interval:
-            due = self._movers.trigger(tick, pose, tracked, arc)
+        if self._movers is not None and t - self._planned_at >= self._policy.min_interval:
+            due = self._movers.trigger(tracked, arc)
             if due:
                 return due
         if self._checked == self.survey.whole:
@@ -300,31 +300,31 @@ class Exploration(RouteGuide):
             return Trigger.STRAYED
         return Trigger.DISCOVERED if hit else ""
 
-    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """Return a new path from a pose; None if there is none, or a scan turn comes first."""
-        now, spent = tick / self._hz, clock()
-        self._planned_at, self._tick = now, tick
+    def replan(self, now: Moment, trigger: str) -> TrackedPath | None:
+        """Return a new path; None if there is none, or a scan turn comes first."""
+        t, pose, spent = now.observed.t, now.pose, clock()
+        self._planned_at, self._tick = t, now.tick
         if trigger in (Trigger.STALLED, Trigger.CONSTRAINED, Trigger.BACKED_OFF, Trigger.MADE_ROOM, Trigger.SCAN_TURN):
-            recovers, way = self._recovered(now, pose, trigger)
+            recovers, way = self._recovered(t, pose, trigger)
             if way is not None:
-                self.note(now, trigger, spent(), 0, way.length, way.route.xy)
+                self.note(t, trigger, spent(), 0, way.length, way.route.xy)
             if recovers:
                 return way
         if self._failures >= PATIENCE and trigger != Trigger.SCAN_TURN:
             self._failures = 0
             self.survey.reset(pose)
-        grid, plan, avoided = self._plan_around(tick, pose, trigger)
+        grid, plan, avoided = self._plan_around(pose, trigger)
         self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.plan_error)
         if not self.lost:
             self._failures = 0
             route, tracked = self._route(pose, grid, plan, avoided)
-            self.note(now, trigger, spent(), plan.work, plan.cost, route.xy)
+            self.note(t, trigger, spent(), plan.work, plan.cost, route.xy)
             return tracked
-        self.note(now, trigger, spent(), plan.work)
+        self.note(t, trigger, spent(), plan.work)
         self._failures += 1
-        self._recovery.note_rest(now, pose)
+        self._recovery.note_rest(t, pose)
         if self._failures >= PATIENCE:
-            self._gave_up_at = now
+            self._gave_up_at = t
             self._recovery.begin_scan_turn(pose)
         return None
 

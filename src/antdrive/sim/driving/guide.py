@@ -175,28 +175,27 @@ class RouteGuide(Guide, abc.ABC):
 
     def path(self, now: Moment, *, at_end: bool = False) -> Follow | Wait | GiveUp:
         """Return the way of a control period, along a new route if one is due and found."""
-        tick, pose, path = now.tick, now.pose, now.way.path
+        path = now.way.path
         if at_end and self._may_wait:
             return self._way(path)
-        asked = tick, pose, now.waiting, path, now.before.pursuit.arc
-        trigger = Trigger.MISSED if at_end else self.trigger(*asked)
-        found = self.replan(tick, pose, trigger) if trigger else None
+        trigger = Trigger.MISSED if at_end else self.trigger(now)
+        found = self.replan(now, trigger) if trigger else None
         if at_end and not found and self._may_wait:
             return self._way(path)
         if error := self._routes.plan_error:
-            return GiveUp(Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {error}"))
+            return GiveUp(Ending(Outcome.INVALID_PLAN, f"on the way, at t = {now.observed.t:g} s: {error}"))
         if at_end:
             return self._way(found) if found else GiveUp()
         if self._blocked:
             return GiveUp(Ending(Outcome.BLOCKED, self._blocked))
-        return self._way(self._refreshed(found or path, pose))
+        return self._way(self._refreshed(found or path, now.pose))
 
-    def trigger(self, tick: int, pose: Pose, waiting: bool, path: TrackedPath, arc: float) -> str:
+    def trigger(self, now: Moment) -> str:
         """Return why a new path is due; empty if none is."""
         return ""
 
-    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """Return a new path from a pose [m, m, rad]; None if there is none."""
+    def replan(self, now: Moment, trigger: str) -> TrackedPath | None:
+        """Return a new path; None if there is none."""
         return None
 
     def _refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
