@@ -26,7 +26,7 @@ def followed(scenario, periods=math.inf):
     with Session(scenario) as drive:
         command, state = Twist(0.0, 0.0), PursuitState()
         while not drive.ended and (now := drive.observe()).tick < periods:
-            command, state = controller.step(drive.path, now.pose, command, state)
+            command, state = controller.pursue(drive.path, now.pose, command, state)
             drive.step(command)
     return drive.run
 

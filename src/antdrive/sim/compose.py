@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import NamedTuple
 
 from antdrive.base.records import unchecked_copy
 from antdrive.robots import Avoidance, Briefing, PurePursuit, capabilities_of_controller
@@ -16,7 +15,7 @@ from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.driver import Driver, full_turn
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.guide import RouteGuide, Rule
+from antdrive.sim.driving.guide import Rule
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.mover_tracking import MoverTracking
@@ -37,6 +36,7 @@ from antdrive.sim.driving.rules import (
 from antdrive.sim.driving.senses import MoverSense, Senses, SimulatedLidar, positioning
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverDetector, Survey, turning_room
+from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import Perception
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
@@ -48,37 +48,29 @@ BLIND_SHARE = (
 )
 
 
-class Sensors(NamedTuple):
-    """Sensors of a robot; None: unused."""
-
-    senses: Senses
-    localiser: Exact
-    lidar: SimulatedLidar | None
-    movers: MoverSense | None
-
-
-def compose(s: Scenario) -> tuple[Sensors, RouteGuide, Driver]:
-    """Create the sensors of a scenario's drive, and the guide and the mind, which know the briefing and observations."""
+def compose(s: Scenario) -> tuple[tuple[Senses, Exact], OneRoute | Exploration, Driver]:
+    """Create a scenario's senses with the localiser, and the guide and the mind, which know the briefing and observations."""
     perception, trajectories, hz, start = perception_of(s), s.trajectories, s.control_hz, s.task.start
     tracks_movers = perception.kind == "lidar"
     levels = s.localisation, s.robot, s.noise, s.odometry, 1 / hz
     senses, localiser = positioning(*levels, start, s.seed, mapless=s.mapless)
-    lidar = None
     if s.mapless or tracks_movers:
-        lidar = SimulatedLidar.of(_lidar(s), s.driven_world, trajectories, seed=s.seed, noisy=s.noise > 0, hz=hz)
+        rng = random_stream(s.seed, "lidar") if s.noise > 0 else None
+        senses.lidar = SimulatedLidar(_lidar(s), s.driven_world, trajectories, hz, rng)
+    if s.moving and not tracks_movers:
+        senses.movers = MoverSense(trajectories, perception, hz)
     briefing = Briefing(
         s.robot, start, s.task.goal, s.task.goal_tolerance, hz,
         map=None if s.mapless else unchecked_copy(s.task.world, movers=()),
-        sight=lidar.first(start, turning_room(s.robot.radius)) if lidar and s.mapless else None,
+        sight=senses.lidar.first(start, turning_room(s.robot.radius)) if senses.lidar and s.mapless else None,
         matching=localiser.matched,
         movers=len(trajectories),
         motions=trajectories.positions if perception.kind == "motions" else None,
     )  # fmt: skip
-    movers = MoverSense(trajectories, perception, hz) if s.moving and not tracks_movers else None
-    return Sensors(senses, localiser, lidar, movers), *_mind(s, briefing)
+    return (senses, localiser), *_mind(s, briefing)
 
 
-def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
+def _mind(s: Scenario, briefing: Briefing) -> tuple[OneRoute | Exploration, Driver]:
     """Create the guide and the mind of a robot from a scenario's settings."""
     perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
     tracks_movers, mapless, moving = perception.kind == "lidar", s.mapless, s.moving
@@ -91,7 +83,7 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
     # A scan may be one scan period old, and commands are delayed.
     reaction = 1 / hz + (1 / _lidar(s).rate if scans else 0.0) + s.robot.noise.scaled(s.noise).delay
     rules: list[Rule] = [_follow(s, briefing, movers)]
-    guide: RouteGuide
+    guide: OneRoute | Exploration
     if survey:
         guide = exploration = _exploration(s, survey, movers)
         rules.append(TurnToScan(s.robot, hz))
@@ -115,7 +107,7 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
             )
         )  # fmt: skip
     if survey:
-        rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_command))
+        rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.recovery.note_command))
     return guide, Driver(briefing, guide, rules, scans, movers)
 
 
@@ -173,7 +165,7 @@ def avoidance_of(s: Scenario) -> Avoidance | None:
     return dataclasses.replace(s.avoidance, reversal_weight=0.0, horizon=horizon)
 
 
-def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
+def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> OneRoute:
     """Create the guide of a robot with a map."""
     policy, avoidance = s.replanning, avoidance_of(s)
     if policy is None or not moving:

@@ -281,7 +281,7 @@ def own_map(log):
     for row in range(0, len(log.t), log.record.physics_hz // log.record.control_hz):
         tick = row * log.record.control_hz // log.record.physics_hz
         estimate = tuple(log.estimate[row].tolist()) if len(log.estimate) else tuple(log.pose[row].tolist())
-        ranges = sensors.lidar.scan(tick, tuple(log.pose[row].tolist()))
+        ranges = sensors[0].lidar.scan(tick, tuple(log.pose[row].tolist()))
         if ranges is not None:
             survey.read(tick, estimate, ranges)
         resets.get(tick, lambda pose: None)(estimate)
@@ -421,7 +421,7 @@ def test_a_map_counts_the_scans_that_are_taken(jackal, rate, share):
     survey = mind.scans
     assert survey.map.share == share
     for tick in range(61):
-        ranges = sensors.lidar.scan(tick, TASK.start)
+        ranges = sensors[0].lidar.scan(tick, TASK.start)
         if ranges is not None:
             survey.read(tick, TASK.start, ranges)
     assert len(survey.scans) == pytest.approx(min(rate, 60), abs=1)
@@ -668,7 +668,7 @@ def test_unknown_ground_is_distinguished_from_hits(jackal):
     task = Task(World("hall", OPEN, (Disc(4.8, 4.0, 0.2),)), HERE, (7.0, 4.0), goal_tolerance=0.25, cell=0.1)
     s = Scenario.of(task, "astar", jackal, map="none")
     exploration = compose(s)[1]
-    survey, recovery = exploration.survey, exploration._recovery
+    survey, recovery = exploration.survey, exploration.recovery
     for twist, unseen in ((FORWARD, False), (Twist(-0.5, 0.0), True), (Twist(0.001, 1.0), False)):
         recovery.note_command(0.0, twist)
         seen, open_ = survey.clear_way(HERE, twist, 1.0), survey.clear_way(HERE, twist, 1.0, freespace=True)

@@ -105,8 +105,8 @@ def test_a_command_that_the_constraint_stops_is_noted(left, slowed, stands):
     noted, wanted = [], Step(Twist(0.3, 0.1), PursuitState())
     caution = StoppingConstraint(None, ROBOT, 20, 0.1, lambda *note: noted.append(note))
     caution.limit = lambda pose, last, command: (Twist(*left), slowed)
-    found = caution.apply(SimpleNamespace(tick=7, pose=(0.0, 0.0, 0.0), before=wanted), wanted)
-    assert [note[:2] for note in noted] == [(7, wanted.command if stands else None)]
+    found = caution.apply(SimpleNamespace(observed=SimpleNamespace(t=0.7), pose=(0.0, 0.0, 0.0), before=wanted), wanted)
+    assert [note[:2] for note in noted] == [(0.7, wanted.command if stands else None)]
     assert found == (Step(Twist(*left), PursuitState(limiter=SIGHT_LIMIT)) if slowed else wanted)
 
 
@@ -116,8 +116,11 @@ def test_only_a_robot_that_its_controller_stops_is_idle(command, marks):
     noted = []
     caution = StoppingConstraint(None, ROBOT, 20, 0.1, lambda *note: noted.append(note))
     caution.limit = lambda pose, last, command: (command, False)
-    caution.apply(SimpleNamespace(tick=7, pose=(0.0, 0.0, 0.0), before=Step()), Step(command, PursuitState(), **marks))
-    assert noted == [(7, None, command == Twist(0.0, 0.0) and not marks)]
+    caution.apply(
+        SimpleNamespace(observed=SimpleNamespace(t=0.7), pose=(0.0, 0.0, 0.0), before=Step()),
+        Step(command, PursuitState(), **marks),
+    )
+    assert noted == [(0.7, None, command == Twist(0.0, 0.0) and not marks)]
 
 
 @pytest.mark.parametrize("arc", ARCS)

@@ -18,14 +18,14 @@ from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.kernel_cache import clock
 from antdrive.base.records import unchecked_copy
 from antdrive.planners import PlanResult, PlanStatus, Query, smooth
-from antdrive.robots import TrackedPath, Twist, outline_of
+from antdrive.robots import TrackedPath, outline_of
 from antdrive.robots.control.pursuit import obstacles_around
 from antdrive.robots.default_margin import mapless_margins
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
 from antdrive.sim.driving.guide import Follow, Moment, RouteGuide, Wait
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import Rows, table_logged
+from antdrive.sim.driving.parts import Drive, table_logged
 from antdrive.sim.driving.recovery import TRAIL, Recovery
 from antdrive.sim.driving.route_planner import RoutePlanner, bounds_of
 from antdrive.sim.driving.survey import PATIENCE, ROUTE_CHECK_STEP, RoutePoints, Survey
@@ -56,6 +56,7 @@ class Exploration(RouteGuide):
 
     Attributes:
         lost: whether the map has no path; the robot then stops
+        recovery: what the robot does where it stalls
     """
 
     def __init__(
@@ -72,7 +73,7 @@ class Exploration(RouteGuide):
         self._checked = self._indexed = 0
         self._planned_at = -math.inf
         self.lost, self._failures, self._gave_up_at = False, 0, -math.inf
-        self._recovery = Recovery(survey, planner.robot, planner.task.start, planner.hz)
+        self.recovery = Recovery(survey, planner.robot, planner.task.start, planner.hz)
         self._tick = 0
         self._seen: list[tuple[int, Floats]] = []
         self._known_as: tuple[tuple[Any, ...], Task] = (), planner.task
@@ -80,7 +81,7 @@ class Exploration(RouteGuide):
     @property
     def _may_wait(self) -> bool:  # type: ignore[override]
         """Whether the robot may stay in place: it has no path and tries again, or it makes a scan turn."""
-        return self.lost or self._recovery.scan_turn is not None
+        return self.lost or self.recovery.scan_turn is not None
 
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start on the map of the first scan. Later plans do not depend on it."""
@@ -254,7 +255,7 @@ class Exploration(RouteGuide):
     # ---- the driver's queries
 
     def _way(self, path: TrackedPath) -> Follow:
-        return Wait(path, scan_turn=self._recovery.scan_turn) if self._may_wait else Follow(path)
+        return Wait(path, scan_turn=self.recovery.scan_turn) if self._may_wait else Follow(path)
 
     def _refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
         if self._indexed == self.survey.whole:
@@ -270,7 +271,7 @@ class Exploration(RouteGuide):
         t, pose, tracked, arc = now.observed.t, now.pose, now.way.path, now.before.pursuit.arc
         if self._movers is not None:
             self._movers.observe(now.waiting)
-        recovery = self._recovery
+        recovery = self.recovery
         if recovery.scan_turn is not None:
             return Trigger.SCAN_TURN if recovery.scan_turn.done else ""
         if self.lost:
@@ -322,15 +323,15 @@ class Exploration(RouteGuide):
             return tracked
         self.note(t, trigger, spent(), plan.work)
         self._failures += 1
-        self._recovery.note_rest(t, pose)
+        self.recovery.note_rest(t, pose)
         if self._failures >= PATIENCE:
             self._gave_up_at = t
-            self._recovery.begin_scan_turn(pose)
+            self.recovery.begin_scan_turn(pose)
         return None
 
     def _recovered(self, now: float, pose: Pose, trigger: str) -> tuple[bool, TrackedPath | None]:
         """Start a recovery; return whether it replaces planning, and the path that it follows."""
-        recovery = self._recovery
+        recovery = self.recovery
         if trigger == Trigger.SCAN_TURN:
             recovery.end_scan_turn(now, pose)
             return False, None
@@ -348,16 +349,12 @@ class Exploration(RouteGuide):
         way = self._prepare(route, SEEN.among(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
         return True, dataclasses.replace(way, backwards=recovery.backwards)
 
-    def note_command(self, tick: int, held: Twist | None, idle: bool) -> None:
-        """Note the twist that the stopping constraint reduced to a stop, None if it did not, and whether the robot is idle."""
-        self._recovery.note_command(tick / self._hz, held, idle)
-
     def failure_note(self, tick: int) -> str:
         """Return a note that the latest searches found no path; empty if one did, or after `LATELY`."""
         if tick / self._hz - self._gave_up_at > LATELY:
             return ""
         return f"no way through what was seen, last at t = {self._gave_up_at:.1f} s"
 
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+    def logged(self, log: Drive, per_tick: int) -> dict[str, Any]:
         """Return the array `seen`: the discs behind each plan. `cells` is empty, since the log has no grid for them."""
         return {"seen": table_logged(self._seen, 4, log, per_tick), "cells": np.empty((0, 2), dtype=np.int32)}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import abc
 import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
@@ -11,16 +10,16 @@ import numpy as np
 
 from antdrive.base import Floats, Pose
 from antdrive.base.plane import arc_lengths
-from antdrive.planners import PlanResult, TimedPlan
+from antdrive.planners import TimedPlan
 from antdrive.robots import Observation, TrackedPath
 from antdrive.sim.driving.blockage import Blockage
-from antdrive.sim.driving.parts import Ending, Rows, Step, StuckClock
+from antdrive.sim.driving.parts import Drive, Ending, Step, StuckClock
 from antdrive.sim.driving.recovery import ScanTurn
 from antdrive.sim.driving.route_planner import RoutePlanner
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ReplanRecord, finite_or_none
 from antdrive.sim.policy import Trigger
-from antdrive.worlds import Grid, Route
+from antdrive.worlds import Route
 
 NO_ROUTE: Floats = np.empty((0, 2))
 LOOKAHEAD = 0.4  # lookahead of the schedule's speed limit [s]
@@ -141,13 +140,13 @@ class Guide:
         """Return the guide's addition to the reason of a drive that is stuck or timed out; may be empty."""
         return ""
 
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+    def logged(self, log: Drive, per_tick: int) -> dict[str, Any]:
         """Return the guide's arrays for the log."""
         return {}
 
 
-class RouteGuide(Guide, abc.ABC):
-    """Guide that also plans the first route. The defaults keep it."""
+class RouteGuide(Guide):
+    """Guide with a route planner. The defaults keep the first route."""
 
     _blocked = ""  # which mover blocks every route, once the robot's patience is over
     _may_wait = False  # whether a robot at the end of its route may wait for a new one
@@ -160,18 +159,6 @@ class RouteGuide(Guide, abc.ABC):
     def footprint_margin(self) -> float | None:  # type: ignore[override]
         """Clearance of plans that keep the footprint clear [m]; None while all keep the disc clear."""
         return self._routes.footprint_margin
-
-    @abc.abstractmethod
-    def first(self) -> tuple[Grid, PlanResult]:
-        """Plan from the start; return the grid and the checked plan."""
-
-    @abc.abstractmethod
-    def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
-        """Check an external plan on the grid of `first`."""
-
-    @abc.abstractmethod
-    def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
-        """Return the route of a plan, and its path for the controller."""
 
     def path(self, now: Moment, *, at_end: bool = False) -> Follow | Wait | GiveUp:
         """Return the way of a control period, along a new route if one is due and found."""

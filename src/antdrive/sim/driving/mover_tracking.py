@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from antdrive.base import Floats, Pose
 from antdrive.robots.lidar import Lidar
-from antdrive.sim.driving.parts import Rows, table_logged
+from antdrive.sim.driving.parts import Drive, table_logged
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import Ground, MappedGround, MoverTracker, TrackedMovers, ends
 
@@ -79,7 +79,7 @@ class MoverTracking:
         ground = MappedGround(seen, self._settle)
         return np.where(self.tracker.suspected(ground, pose, ranges, tick / self.hz), np.inf, ranges)
 
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+    def logged(self, log: Drive, per_tick: int) -> dict[str, Any]:
         """Return the array `tracks` of a log (K, 7)."""
         lines = (
             (tick, np.column_stack((movers.numbers, movers.positions, movers.velocities, movers.radii)))

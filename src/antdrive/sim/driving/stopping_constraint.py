@@ -32,7 +32,7 @@ class StoppingConstraint:
         robot: RobotSpec,
         hz: int,
         reaction: float,
-        note: Callable[[int, Twist | None, bool], None],
+        note: Callable[[float, Twist | None, bool], None],
     ) -> None:
         self._survey, self._robot, self._period, self._reaction = survey, robot, 1 / hz, reaction
         self._note = note
@@ -42,7 +42,7 @@ class StoppingConstraint:
         command, slowed = self.limit(now.pose, now.before.command, step.command)
         stands = abs(command.speed) < SLOWEST and abs(command.yaw_rate) < SLOWEST
         idle = stands and not (slowed or step.avoids or step.waits)
-        self._note(now.tick, step.command if slowed and stands else None, idle)
+        self._note(now.observed.t, step.command if slowed and stands else None, idle)
         if not slowed:
             return step
         return step._replace(command=command, pursuit=step.pursuit._replace(limiter=SIGHT_LIMIT))
