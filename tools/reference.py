@@ -264,7 +264,7 @@ def robots() -> list[str]:
         return (
             code(name),
             _picture("robots", name),
-            cell(footprint_text(robot)),
+            cell(footprint_text(robot.footprint)),
             top,
             sensor,
             cell(after.strip().removeprefix("After ")),

@@ -32,7 +32,6 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import configuration_of, plan_record
 from antdrive.sim.scenario import Scenario, usual_time_limit
-from antdrive.sim.written import Written
 from antdrive.worlds import Grid
 
 if TYPE_CHECKING:
@@ -158,7 +157,7 @@ class Session:
             outcome=log.outcome,
             reason=log.reason,
             physics=log.physics,
-            written=settings_of(Written.of(s).plain()),
+            written=settings_of(s.written.plain()),
             versions=versions(),
             times=TimesRecord(plan_s=self.plan.wall_s, drive_wall_s=drive_wall_s, replans_s=tuple(guide.walls)),
         )
