@@ -43,9 +43,8 @@ from antdrive.sim.sensing.tracking import KnownGround
 from antdrive.worlds import Task, World
 
 DRIFTING_SHARE = 0.6  # `GOAL_SHARE` of a mapless robot that tracks movers by lidar
-BLIND_SHARE = (
-    0.3  # such a robot backs into its blind sector at this fraction of its top speed, unless it avoids a mover
-)
+# Such a robot backs into its blind sector at this fraction of its top speed, unless it avoids a mover.
+BLIND_SHARE = 0.3
 
 
 def compose(s: Scenario) -> tuple[tuple[Senses, Exact], OneRoute | Exploration, Driver]:
@@ -67,15 +66,15 @@ def compose(s: Scenario) -> tuple[tuple[Senses, Exact], OneRoute | Exploration, 
         movers=len(trajectories),
         motions=trajectories.positions if perception.kind == "motions" else None,
     )  # fmt: skip
-    return (senses, localiser), *_mind(s, briefing)
+    return (senses, localiser), *navigator(s, briefing)
 
 
-def _mind(s: Scenario, briefing: Briefing) -> tuple[OneRoute | Exploration, Driver]:
+def navigator(s: Scenario, briefing: Briefing) -> tuple[OneRoute | Exploration, Driver]:
     """Create the guide and the mind of a robot from a scenario's settings."""
     perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
     tracks_movers, mapless, moving = perception.kind == "lidar", s.mapless, s.moving
     survey = _survey(s, briefing, tracks_movers) if mapless else None
-    scans = _mover_detector(s) if not mapless and tracks_movers else survey
+    scans = survey or (_mover_detector(s) if tracks_movers else None)
     tracking = scans.tracking if scans else None
     movers = PerceivedMovers(perception, briefing.movers, briefing.motions)
     if tracking:
@@ -94,18 +93,16 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[OneRoute | Exploration, Driv
     if moving and avoidance is not None and not capabilities_of_controller(s.controller).avoids_movers:
         if not mapless and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
             rules.append(SlowAtCorners(tracking, s.robot, hz, reaction))
-        drifts = survey is not None and tracks_movers
-        share = DRIFTING_SHARE if drifts else GOAL_SHARE
-        blind = drifts and not _lidar(s).full_circle
-        backwards = BLIND_SHARE * s.robot.max_speed if blind else math.inf
-        habits = Habits(movers, hz) if movers.uncertain else None
-        delay, losses = s.robot.noise.scaled(s.noise).delay, clearances_off_route(s.robot, s.pursuit, s.noise)
-        rules.append(
-            Avoid(
-                avoidance, movers, s.task, s.robot, hz, goal_share=share, backwards=backwards, delay=delay,
-                losses=losses, habits=habits,
-            )
+        drifts = mapless and tracks_movers
+        avoid = Avoid(
+            avoidance, movers, s.task, s.robot, hz,
+            goal_share=DRIFTING_SHARE if drifts else GOAL_SHARE,
+            backwards=BLIND_SHARE * s.robot.max_speed if drifts and not _lidar(s).full_circle else math.inf,
+            delay=s.robot.noise.scaled(s.noise).delay,
+            losses=clearances_off_route(s.robot, s.pursuit, s.noise),
+            habits=Habits(movers, hz) if movers.uncertain else None,
         )  # fmt: skip
+        rules.append(avoid)
     if survey:
         rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.recovery.note_command))
     return guide, Driver(briefing, guide, rules, scans, movers)

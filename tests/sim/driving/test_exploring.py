@@ -575,13 +575,13 @@ def test_a_blocked_scan_turn_ends(turtlebot):
 def survey_of(robot, left, right, open_=1.0):
     """A survey that sees so much free ground for turns, and none ahead, where nothing was hit for so far."""
     turns = {1.0: left, -1.0: right}
-    return SimpleNamespace(
-        lidar=robot.lidar,
-        map=SimpleNamespace(share=1, stride=1),
-        clear_turn=lambda pose, side, farthest: min(turns[side], farthest),
-        clear_distance=lambda pose, speed, rate, longest: 0.0,
-        clear_way=lambda pose, twist, farthest, freespace: open_ if freespace else 0.0,
-    )
+
+    def clear_way(pose, speed, rate, farthest, freespace=False):
+        if speed:
+            return open_ if freespace else 0.0
+        return min(turns[rate], farthest)
+
+    return SimpleNamespace(lidar=robot.lidar, map=SimpleNamespace(share=1, stride=1), clear_way=clear_way)
 
 
 @pytest.mark.parametrize(
@@ -671,7 +671,7 @@ def test_unknown_ground_is_distinguished_from_hits(jackal):
     survey, recovery = exploration.survey, exploration.recovery
     for twist, unseen in ((FORWARD, False), (Twist(-0.5, 0.0), True), (Twist(0.001, 1.0), False)):
         recovery.note_command(0.0, twist)
-        seen, open_ = survey.clear_way(HERE, twist, 1.0), survey.clear_way(HERE, twist, 1.0, freespace=True)
+        seen, open_ = (survey.clear_way(HERE, *twist, 1.0, freespace=open_) for open_ in (False, True))
         assert seen <= open_
         assert recovery.held_by_unknown(HERE) == unseen, (twist, seen, open_)
 

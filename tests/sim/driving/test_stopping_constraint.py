@@ -64,7 +64,7 @@ def driven(robot, world, start, wanted, hz, held, *, told=None):
 
 def limited(last, command, free):
     """What becomes of a command where `free` metres or radians are observed as free, with 0.1 s to react."""
-    survey = SimpleNamespace(clear_distance=lambda *_: free, clear_turn=lambda *_: free)
+    survey = SimpleNamespace(clear_way=lambda *_: free)
     return StoppingConstraint(survey, ROBOT, 20, 0.1, lambda *noted: None).limit((0.0, 0.0, 0.0), last, command)
 
 
@@ -222,9 +222,9 @@ def test_a_robot_that_resets_its_map_turns_over_no_known_post(beside):
         x = min(3.0, 1.5 + 0.01 * tick)
         if robot.lidar.due(tick, 50):
             survey.read(tick, (x, 2.0, 0.0), scanner.scan((x, 2.0, 0.0)))
-    known = survey.clear_turn(here, 1.0, math.pi)
+    known = survey.clear_way(here, 0.0, 1.0, math.pi)
     survey.reset(here)
-    turn = survey.clear_turn(here, 1.0, math.pi)
+    turn = survey.clear_way(here, 0.0, 1.0, math.pi)
     if beside is None:
         assert turn == known == math.pi
         return

@@ -146,9 +146,15 @@ class Guide:
 
 
 class RouteGuide(Guide):
-    """Guide with a route planner. The defaults keep the first route."""
+    """Guide with a route planner. The defaults keep the first route.
 
-    _blocked = ""  # which mover blocks every route, once the robot's patience is over
+    Attributes:
+        schedule: that of the timed plan; None without one
+        blockage: failed searches behind standing movers; None if it does not replan among them
+    """
+
+    schedule: Schedule | None = None
+    blockage: Blockage | None = None
     _may_wait = False  # whether a robot at the end of its route may wait for a new one
 
     def __init__(self, planner: RoutePlanner) -> None:
@@ -173,8 +179,8 @@ class RouteGuide(Guide):
             return GiveUp(Ending(Outcome.INVALID_PLAN, f"on the way, at t = {now.observed.t:g} s: {error}"))
         if at_end:
             return self._way(found) if found else GiveUp()
-        if self._blocked:
-            return GiveUp(Ending(Outcome.BLOCKED, self._blocked))
+        if self.blockage is not None and self.blockage.reason:
+            return GiveUp(Ending(Outcome.BLOCKED, self.blockage.reason))
         return self._way(self._refreshed(found or path, now.pose))
 
     def trigger(self, now: Moment) -> str:
@@ -190,7 +196,7 @@ class RouteGuide(Guide):
         return path
 
     def _way(self, path: TrackedPath) -> Follow:
-        return Follow(path)
+        return Follow(path, self.schedule, self.blockage)
 
     def note(
         self, t: float, trigger: str, wall_s: float = 0.0, work: int = 0, cost: float = math.inf, xy: Floats = NO_ROUTE

@@ -70,13 +70,13 @@ class MoverTracking:
         hides = np.where(steps[jumps] > 0, wide[:-1], wide[1:]) & np.isfinite(ranges[nearer]) & ~theirs[nearer]
         return ends(self._lidar, pose, ranges, nearer[hides])
 
-    def update_on_map(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
-        """Update with a scan of a robot that makes its own map, before the map takes the scan."""
-        return self.read(MappedGround(seen, self._settle), pose, ranges, tick)
+    def ground(self, seen: OccupancyMap) -> MappedGround:
+        """Return the ground of a robot that makes its own map, before the map takes the scan."""
+        return MappedGround(seen, self._settle)
 
     def standing(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> Floats:
         """Return an unprocessed scan without hits on possible movers (beams,) [m]: those ranges are infinite."""
-        ground = MappedGround(seen, self._settle)
+        ground = self.ground(seen)
         return np.where(self.tracker.suspected(ground, pose, ranges, tick / self.hz), np.inf, ranges)
 
     def logged(self, log: Drive, per_tick: int) -> dict[str, Any]:

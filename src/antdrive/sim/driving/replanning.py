@@ -33,7 +33,7 @@ from antdrive.planners import (
 )
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blockage import Blockage, blocked_cells, covered_discs, points_at, with_obstacles
-from antdrive.sim.driving.guide import Follow, Moment
+from antdrive.sim.driving.guide import Moment
 from antdrive.sim.driving.movers_ahead import MoversAhead, Traffic
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.route_planner import RoutePlanner
@@ -50,6 +50,8 @@ class Replanning(OneRoute):
     Attributes:
         policy: when to replan
     """
+
+    blockage: Blockage
 
     def __init__(
         self, planner: RoutePlanner, policy: ReplanPolicy, movers: PerceivedMovers, clearance: float = 0.0
@@ -70,13 +72,6 @@ class Replanning(OneRoute):
         traffic = Traffic(movers, robot.radius, task.world.bounds, self._hz) if learns else None
         self._ahead = MoversAhead(movers, policy, task.goal, grid, traffic, self.blockage)
         return super().route(grid, plan)
-
-    @property
-    def _blocked(self) -> str:  # type: ignore[override]
-        return self.blockage.reason
-
-    def _way(self, path: TrackedPath) -> Follow:
-        return Follow(path, self.schedule, self.blockage)
 
     def trigger(self, now: Moment) -> str:
         """Return why a new route is due; empty if none is."""
