@@ -105,7 +105,7 @@ def navigator(s: Scenario, briefing: Briefing) -> tuple[OneRoute | Exploration, 
         rules.append(avoid)
     if survey:
         rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.recovery.note_command))
-    return guide, Driver(briefing, guide, rules, scans, movers)
+    return guide, Driver(briefing, guide, rules, scans, movers if moving or tracking else None)
 
 
 def perception_of(s: Scenario) -> Perception:

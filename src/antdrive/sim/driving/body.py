@@ -78,7 +78,7 @@ class Body:
         now = self._now or self.observe()
         believed = self._localiser.pose = note.pose or now.pose
         self.estimates.append(believed)
-        if self._arrived(believed, now.twist) or (command is None and note.ending is None):
+        if (command is None and note.ending is None) or self._arrived(believed, now.twist):
             self.ended = self._judged(believed)
             return
         if command is None:

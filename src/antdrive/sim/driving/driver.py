@@ -71,11 +71,14 @@ class Driver:
         if self._movers is not None:
             self._movers.read(seen)
         waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
-        way = guide.path(Moment(seen, self.way, before, self._clock, waiting))
+        moment = Moment(seen, self.way, before, self._clock, waiting)
+        way = guide.path(moment)
         if isinstance(way, GiveUp):
             return None, Note(believed, ending=way.ending)
-        self._follow(way)
-        moment, step = Moment(seen, way, self.step, self._clock), self.step
+        if way is not self.way:
+            self._follow(way)
+            moment = Moment(seen, way, self.step, self._clock)
+        step = self.step
         for rule in self.rules:
             step = rule.apply(moment, step)
         self.step = step

@@ -155,6 +155,7 @@ class RouteGuide(Guide):
 
     schedule: Schedule | None = None
     blockage: Blockage | None = None
+    _last: Follow | None = None
     _may_wait = False  # whether a robot at the end of its route may wait for a new one
 
     def __init__(self, planner: RoutePlanner) -> None:
@@ -196,7 +197,9 @@ class RouteGuide(Guide):
         return path
 
     def _way(self, path: TrackedPath) -> Follow:
-        return Follow(path, self.schedule, self.blockage)
+        if self._last is None or path is not self._last.path:
+            self._last = Follow(path, self.schedule, self.blockage)
+        return self._last
 
     def note(
         self, t: float, trigger: str, wall_s: float = 0.0, work: int = 0, cost: float = math.inf, xy: Floats = NO_ROUTE
