@@ -33,11 +33,11 @@ from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.drive import follow
 from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.perceived_movers import Given
+from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.driving.replanning import Replanning
 from antdrive.sim.driving.rules import Avoid
-from antdrive.sim.driving.senses import MoverSense
+from antdrive.sim.driving.senses import MoverSense, Senses
 from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.physics.engine import CHASSIS_AND_ANY, Engine
 from antdrive.worlds import Cruising, Disc, Route, Task, Trajectories, World
@@ -101,13 +101,12 @@ def table_of_movers(route: Route, rounds: int) -> None:
                 (f"{MOVERS} movers, not seen", full, moving),
                 (f"{MOVERS} movers, avoided", full, moving),
             ):
-                told, sense = Given(Perception(), 60, len(motions)), MoverSense(motions, Perception(), 60)
+                told, senses = PerceivedMovers(Perception(), len(motions)), Senses()
+                senses.movers = MoverSense(motions, Perception(), 60)
                 avoid = Avoid(Avoidance(), told, task, robot, 60)
                 started = time.process_time()
-                rules = [avoid] if name.endswith("avoided") else []
-                log = follow(
-                    engine, controller, tracked, task, limit=30, rules=rules, movers=(sense, told) if rules else None
-                )
+                parts: Any = {"rules": [avoid], "senses": senses, "movers": told} if name.endswith("avoided") else {}
+                log = follow(engine, controller, tracked, task, limit=30, **parts)
                 if turn:
                     costs.setdefault(name, []).append((time.process_time() - started) / (len(log.t) - 1) * 1e6)
     print("\nloop                     us/step   / no movers")

@@ -264,7 +264,7 @@ def robots() -> list[str]:
         return (
             code(name),
             _picture("robots", name),
-            cell(footprint_text(robot)),
+            cell(footprint_text(robot.footprint)),
             top,
             sensor,
             cell(after.strip().removeprefix("After ")),
@@ -383,9 +383,9 @@ def composition() -> list[str]:
 
     def row(kind: str) -> Row:
         world, name, settings = kinds[kind]
-        sensors, guide, mind = compose(Scenario.of(world, name, **settings))
+        (_, localiser), guide, mind = compose(Scenario.of(world, name, **settings))
         rules = ", ".join(code(type(rule).__name__) for rule in mind.rules)
-        return kind, *map(_class, (sensors.localiser, mind.scans, guide)), rules
+        return kind, *map(_class, (localiser, mind.scans, guide)), rules
 
     return table("drive, localiser, scans, guide, rules in order", map(row, kinds))
 

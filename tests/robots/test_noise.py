@@ -150,7 +150,8 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 def drawn(robot, kind):
     """x, y, width and height of the rectangles of a kind [m]."""
-    root = ElementTree.fromstring(robot_svg(robot))
+    drawn = robot_svg(robot.footprint, robot.wheel_radius, robot.track, robot.wheel_thickness)
+    root = ElementTree.fromstring(drawn)
     rects = [part for part in root.iter(f"{SVG}rect") if part.get("class") == kind]
     return [tuple(float(part.attrib[key]) / 1000 for key in ("x", "y", "width", "height")) for part in rects]
 

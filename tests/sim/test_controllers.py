@@ -147,13 +147,13 @@ def test_options_without_a_name_are_those_of_pure_pursuit():
     old, new = ({"lookahead_time": 0.5}, {"name": "pure-pursuit", "lookahead_time": 0.5})
     assert scenario(old).controller == scenario(new).controller == PurePursuit(lookahead_time=0.5)
     assert scenario(old).key == scenario(PurePursuit(lookahead_time=0.5)).key
-    assert Written.of(scenario(new)).settings == {"controller": {"lookahead_time": 0.5}}
+    assert scenario(new).written.settings == {"controller": {"lookahead_time": 0.5}}
 
 
 @pytest.mark.parametrize("given", [Stanley(), Stanley(gain=3.0), DynamicWindow(reach=1.0), PurePursuit(braking=0.5)])
 def test_words_and_commands_of_a_controller_give_it_again(given):
     s = scenario(given)
-    words = Written.of(s)
+    words = s.written
     assert Written.read(words.plain()).settings == words.settings
     assert scenario(words.settings["controller"]).controller == given
 

@@ -10,6 +10,7 @@ from antdrive.base import FieldError
 from antdrive.planners import load_planner
 from antdrive.robots import load_robot
 from antdrive.sim import Rollout, Scenario, certify, run
+from antdrive.sim.idle_settings import idle_settings
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.rerun import replayed
 from antdrive.sim.verifying import false_claims
@@ -141,5 +142,5 @@ def test_exact_needs_a_planner_for_footprints(jackal):
 
 
 def test_a_disc_has_no_choice_of_shape(turtlebot):
-    notes = Scenario.of(door(3.0), "astar", turtlebot, footprint="exact").idle_settings({"footprint"})
+    notes = idle_settings(Scenario.of(door(3.0), "astar", turtlebot, footprint="exact"), {"footprint"})
     assert notes == {"footprint": "turtlebot is a disc"}

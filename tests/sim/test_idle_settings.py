@@ -11,7 +11,7 @@ from antdrive.planners import load_planner
 from antdrive.robots import Noise, PurePursuit
 from antdrive.robots.control.pursuit import controller_options
 from antdrive.sim import Perception, ReplanPolicy, run
-from antdrive.sim.idle_settings import idle_notes
+from antdrive.sim.idle_settings import idle_notes, idle_settings
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.settings import SETTINGS
 from antdrive.worlds import Cruising, Disc, Wandering
@@ -113,7 +113,7 @@ IDLE = {
 
 @pytest.mark.parametrize("kind", IDLE)
 def test_a_setting_without_effect_changes_no_bit(kinds, arrays, kind):
-    idle = [(key, s) for key, s in changed(kinds[kind]) if key in s.idle_settings()]
+    idle = [(key, s) for key, s in changed(kinds[kind]) if key in idle_settings(s)]
     assert " ".join(dict.fromkeys(key for key, _ in idle)) == IDLE[kind]
     assert [key for key, s in idle if not same(arrays(s), arrays(kinds[kind]))] == []
 
@@ -121,8 +121,8 @@ def test_a_setting_without_effect_changes_no_bit(kinds, arrays, kind):
 @pytest.mark.parametrize(("kind", "known"), [("static", ""), ("raw", "static")])
 def test_the_other_settings_change_the_drive(kinds, arrays, kind, known):
     """Along a raw path, those that are idle along a smoothed one."""
-    shown = {key for key, s in changed(kinds[known]) if key not in s.idle_settings()} if known else set()
-    acting = [(key, s) for key, s in changed(kinds[kind]) if key not in {*s.idle_settings(), *shown, *QUIET}]
+    shown = {key for key, s in changed(kinds[known]) if key not in idle_settings(s)} if known else set()
+    acting = [(key, s) for key, s in changed(kinds[kind]) if key not in {*idle_settings(s), *shown, *QUIET}]
     assert len(acting) >= 1
     assert [key for key, s in acting if same(arrays(s), arrays(kinds[kind]))] == []
 
@@ -130,13 +130,13 @@ def test_the_other_settings_change_the_drive(kinds, arrays, kind, known):
 def test_errors_of_odometry_act_on_noisy_fixes_without_a_map(kinds, arrays):
     noisy = replace(kinds["mapless"], noise=1.0)
     worse = replace(noisy, odometry=2.0)
-    assert "odometry" not in worse.idle_settings()
+    assert "odometry" not in idle_settings(worse)
     assert not same(arrays(worse), arrays(noisy))
 
 
 def test_a_setting_at_its_default_is_reported_only_if_it_counts_as_given(small_scenario):
-    assert small_scenario.idle_settings() == {}
-    assert small_scenario.idle_settings({"seed"}) == {"seed": "astar and the drive draw no random numbers"}
+    assert idle_settings(small_scenario) == {}
+    assert idle_settings(small_scenario, {"seed"}) == {"seed": "astar and the drive draw no random numbers"}
 
 
 def test_seeds_act_on_ants_noise_and_movers_that_walk_at_random(kinds):
@@ -149,7 +149,7 @@ def test_seeds_act_on_ants_noise_and_movers_that_walk_at_random(kinds):
         replace(kinds["static"], task=among),
         replace(kinds["mapless"], localisation="odometry"),
     ):
-        assert scenario.idle_settings({"seed"}) == {}
+        assert idle_settings(scenario, {"seed"}) == {}
 
 
 def test_notes_name_how_many_configurations_a_setting_leaves_unchanged(small_scenario):

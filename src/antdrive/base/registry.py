@@ -126,8 +126,8 @@ class Registry(Generic[Component]):
     def word_of(self, component: Component) -> str:
         """Return the name that loads a component: registered, or FILE.py:CLASS for one made in Python."""
         kind = type(component)
-        registered = next((name for name, one in self.all().items() if type(one) is kind), None)
-        return registered or word_of(component) or f"FILE.py:{kind.__name__}"
+        registered = (name for some in (self.known, self.all) for name, one in some().items() if type(one) is kind)
+        return next(registered, None) or word_of(component) or f"FILE.py:{kind.__name__}"
 
     def version(self, name: str) -> str:
         """Return the distribution and version of the component with a name; with the hash of its file if it is third-party.

@@ -111,7 +111,9 @@ class Setup:
         words = dataclasses.replace(
             place, planner=self.planner, options=chosen["planner"], robot=self.robot, settings=settings, seed=seed
         )
-        return words.scenario(at=functools.partial(at_option, words), choose=with_calibrated_margin)
+        from antdrive.sim.scenario import Scenario
+
+        return Scenario.read(words, at=functools.partial(at_option, words), choose=with_calibrated_margin)
 
 
 def with_calibrated_margin(scenario: "Scenario") -> "Scenario":

@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
-from antdrive.worlds.svg import card
-
-if TYPE_CHECKING:  # `RobotSpec` imports this module to draw itself
-    from antdrive.robots.lidar import Lidar
-    from antdrive.robots.spec import RobotSpec
+from antdrive.robots.lidar import Lidar
+from antdrive.robots.outline import Footprint
 
 WIDTH = 240  # of a drawing [px]
 BODY, BODY_EDGE, WHEEL, HEADING, RULER = "#e8ecf6", "#345cbe", "#39424f", "#ff7a0e", "#5b6576"
-WHEEL_ASPECT = 0.4  # drawn thickness of a wheel as a fraction of its diameter; robot files do not give it
 MM = 1000.0  # drawing units in a metre; browsers render text badly at a scale of metres
 
 
-def robot_svg(spec: RobotSpec) -> str:
+def robot_svg(foot: Footprint, wheel_radius: float, track: float, wheel_thickness: float) -> str:
     """Draw a robot from above as SVG, to scale, heading right: footprint, wheels, heading and a ruler.
 
     Coordinates are millimetres from the axle's centre, y upwards.
     """
-    foot = spec.footprint
     xmin, ymin, xmax, ymax = (MM * value for value in foot.bounds)
     half_x, half_y, middle = (xmax - xmin) / 2, (ymax - ymin) / 2, (xmin + xmax) / 2
     pad = 0.12 * max(half_x, half_y)
@@ -37,8 +31,8 @@ def robot_svg(spec: RobotSpec) -> str:
             f'<rect class="footprint" x="{xmin:.6g}" y="{ymin:.6g}" width="{2 * half_x:.6g}" '
             f'height="{2 * half_y:.6g}" rx="{MM * foot.rounding:.6g}" {paint}'
         ]
-    radius, thickness = MM * spec.wheel_radius, MM * wheel_thickness(spec)
-    for y in (MM * spec.track / 2, -MM * spec.track / 2):
+    radius, thickness = MM * wheel_radius, MM * wheel_thickness
+    for y in (MM * track / 2, -MM * track / 2):
         parts.append(
             f'<rect class="wheel" x="{-radius:.6g}" y="{y - thickness / 2:.6g}" width="{2 * radius:.6g}" '
             f'height="{thickness:.6g}" rx="{min(radius, thickness) / 4:.3g}" fill="{WHEEL}"/>'
@@ -65,31 +59,6 @@ def robot_svg(spec: RobotSpec) -> str:
     )
 
 
-def robot_card(spec: RobotSpec) -> str:
-    """Return a robot's drawing and main values as HTML."""
-    return card(robot_svg(spec), spec.name, facts_of(spec))
-
-
-def facts_of(spec: RobotSpec) -> dict[str, str]:
-    """Return a robot's main values as text."""
-    noise = spec.noise
-    noisy = (
-        f"pose ±{noise.pose_xy:g} m, ±{noise.pose_yaw:g} rad; encoders ±{100 * noise.encoder:g} %; "
-        f"slip ±{100 * noise.slip:g} %; delay {noise.delay:g} s"
-    )
-    near = f"; {spec.near_speed:g} m/s near movers ahead" if spec.near_speed < spec.max_speed else ""
-    return {
-        "footprint": footprint_text(spec),
-        "body": f"{spec.height:g} m high, {spec.mass:g} kg",
-        "wheels": f"radius {spec.wheel_radius:g} m, {spec.track:g} m apart",
-        "speed": f"up to {spec.max_speed:g} m/s, {spec.max_yaw_rate:g} rad/s{near}",
-        "acceleration": f"up to {spec.max_acceleration:g} m/s², {spec.max_yaw_acceleration:g} rad/s²; "
-        f"lateral {spec.max_lateral_acceleration:g} m/s²",
-        **({} if spec.lidar is None else {"lidar": lidar_text(spec.lidar)}),
-        "noise": noisy if noise.nonzero else "none",
-    }
-
-
 def lidar_text(lidar: Lidar) -> str:
     """Describe a lidar: beams, field of view, rate, ranges and position."""
     view = "all around" if lidar.full_circle else f"{math.degrees(lidar.field_of_view):.4g}°"
@@ -100,9 +69,8 @@ def lidar_text(lidar: Lidar) -> str:
     )
 
 
-def footprint_text(spec: RobotSpec) -> str:
-    """Describe a robot's footprint: kind, size and offset from the axle."""
-    foot = spec.footprint
+def footprint_text(foot: Footprint) -> str:
+    """Describe a footprint: kind, size and offset from the axle."""
     xmin, ymin, xmax, ymax = foot.bounds
     size = f"{xmax - xmin:g} × {ymax - ymin:g} m"
     if foot.is_disc or len(foot.corners) == 1:
@@ -115,17 +83,6 @@ def footprint_text(spec: RobotSpec) -> str:
     aside = f" and {abs(y):.3g} m to the {'left' if y > 0 else 'right'}" if abs(y) > 1e-9 else ""
     off = f"; its middle {abs(x):.3g} m {'ahead of' if x >= 0 else 'behind'} the axle{aside}"
     return text + (off if math.hypot(x, y) > 1e-9 else "")
-
-
-def wheel_thickness(spec: RobotSpec) -> float:
-    """Return the drawn thickness of the wheels, limited to the footprint [m]."""
-    foot = spec.footprint
-    if foot.corners:
-        return max(min(2 * spec.wheel_radius * WHEEL_ASPECT, 2 * spec.wheel_room), 0.02 * spec.track)
-    beyond = max(spec.wheel_radius - foot.half_length, 0)
-    edge = foot.half_width + math.sqrt(max(foot.rounding**2 - beyond**2, 0))
-    room = 2 * (edge - spec.track / 2)
-    return max(min(2 * spec.wheel_radius * WHEEL_ASPECT, room), 0.02 * spec.track)
 
 
 def _ruler_length(most: float) -> float:

@@ -89,6 +89,7 @@ class Noise:
 
 
 FOOTPRINT_RANGE = (0.02, 20.0)  # of the diameter, or of length and width [m]
+WHEEL_ASPECT = 0.4  # drawn thickness of a wheel as a fraction of its diameter
 WHEEL_ROOM = 0.05  # minimum distance from a wheel's centre to the footprint's edge [wheel radii]
 
 
@@ -204,11 +205,44 @@ class RobotSpec:
         """Least horizontal distance from a wheel's centre to the footprint's edge [m]."""
         return min(self.footprint.depth(0.0, side * self.track / 2) for side in (1, -1))
 
-    def _repr_html_(self) -> str:
-        """Return the robot's card for notebooks."""
-        from antdrive.robots.card import robot_card
+    @property
+    def wheel_thickness(self) -> float:
+        """Drawn thickness of the wheels, which robot files do not give, limited to the footprint [m]."""
+        foot, room = self.footprint, 2 * self.wheel_room
+        if not foot.corners:
+            beyond = max(self.wheel_radius - foot.half_length, 0)
+            edge = foot.half_width + math.sqrt(max(foot.rounding**2 - beyond**2, 0))
+            room = 2 * (edge - self.track / 2)
+        return max(min(2 * self.wheel_radius * WHEEL_ASPECT, room), 0.02 * self.track)
 
-        return robot_card(self)
+    @property
+    def facts(self) -> dict[str, str]:
+        """The main values as text."""
+        from antdrive.robots.card import footprint_text, lidar_text
+
+        noise = self.noise
+        noisy = (
+            f"pose ±{noise.pose_xy:g} m, ±{noise.pose_yaw:g} rad; encoders ±{100 * noise.encoder:g} %; "
+            f"slip ±{100 * noise.slip:g} %; delay {noise.delay:g} s"
+        )
+        near = f"; {self.near_speed:g} m/s near movers ahead" if self.near_speed < self.max_speed else ""
+        return {
+            "footprint": footprint_text(self.footprint),
+            "body": f"{self.height:g} m high, {self.mass:g} kg",
+            "wheels": f"radius {self.wheel_radius:g} m, {self.track:g} m apart",
+            "speed": f"up to {self.max_speed:g} m/s, {self.max_yaw_rate:g} rad/s{near}",
+            "acceleration": f"up to {self.max_acceleration:g} m/s², {self.max_yaw_acceleration:g} rad/s²; "
+            f"lateral {self.max_lateral_acceleration:g} m/s²",
+            **({} if self.lidar is None else {"lidar": lidar_text(self.lidar)}),
+            "noise": noisy if noise.nonzero else "none",
+        }
+
+    def _repr_html_(self) -> str:
+        from antdrive.robots.card import robot_svg
+        from antdrive.worlds.svg import card
+
+        drawing = robot_svg(self.footprint, self.wheel_radius, self.track, self.wheel_thickness)
+        return card(drawing, self.name, self.facts)
 
 
 GRAVITY = 9.81  # [m/s^2]

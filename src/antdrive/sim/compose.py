@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import NamedTuple
 
 from antdrive.base.records import unchecked_copy
 from antdrive.robots import Avoidance, Briefing, PurePursuit, capabilities_of_controller
@@ -16,12 +15,12 @@ from antdrive.robots.default_margin import clearances_off_route
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.driver import Driver, full_turn
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.guide import RouteGuide, Rule
+from antdrive.sim.driving.guide import Rule
 from antdrive.sim.driving.habits import Habits
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.mover_tracking import MoverTracking
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.perceived_movers import Given, PerceivedMovers, Tracked
+from antdrive.sim.driving.perceived_movers import PerceivedMovers, Tracked
 from antdrive.sim.driving.replanning import CellByCell, Replanning
 from antdrive.sim.driving.route_planner import RoutePlanner
 from antdrive.sim.driving.routes import OneRoute
@@ -37,62 +36,55 @@ from antdrive.sim.driving.rules import (
 from antdrive.sim.driving.senses import MoverSense, Senses, SimulatedLidar, positioning
 from antdrive.sim.driving.stopping_constraint import StoppingConstraint
 from antdrive.sim.driving.survey import MoverDetector, Survey, turning_room
+from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import Perception
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.tracking import KnownGround
 from antdrive.worlds import Task, World
 
 DRIFTING_SHARE = 0.6  # `GOAL_SHARE` of a mapless robot that tracks movers by lidar
-BLIND_SHARE = (
-    0.3  # such a robot backs into its blind sector at this fraction of its top speed, unless it avoids a mover
-)
+# Such a robot backs into its blind sector at this fraction of its top speed, unless it avoids a mover.
+BLIND_SHARE = 0.3
 
 
-class Sensors(NamedTuple):
-    """Sensors of a robot; None: unused."""
-
-    senses: Senses
-    localiser: Exact
-    lidar: SimulatedLidar | None
-    movers: MoverSense | None
-
-
-def compose(s: Scenario) -> tuple[Sensors, RouteGuide, Driver]:
-    """Create the sensors of a scenario's drive, and the guide and the mind, which know the briefing and observations."""
+def compose(s: Scenario) -> tuple[tuple[Senses, Exact], OneRoute | Exploration, Driver]:
+    """Create a scenario's senses with the localiser, and the guide and the mind, which know the briefing and observations."""
     perception, trajectories, hz, start = perception_of(s), s.trajectories, s.control_hz, s.task.start
     tracks_movers = perception.kind == "lidar"
     levels = s.localisation, s.robot, s.noise, s.odometry, 1 / hz
     senses, localiser = positioning(*levels, start, s.seed, mapless=s.mapless)
-    lidar = None
     if s.mapless or tracks_movers:
-        lidar = SimulatedLidar.of(_lidar(s), s.driven_world, trajectories, seed=s.seed, noisy=s.noise > 0, hz=hz)
+        rng = random_stream(s.seed, "lidar") if s.noise > 0 else None
+        senses.lidar = SimulatedLidar(_lidar(s), s.driven_world, trajectories, hz, rng)
+    if s.moving and not tracks_movers:
+        senses.movers = MoverSense(trajectories, perception, hz)
     briefing = Briefing(
         s.robot, start, s.task.goal, s.task.goal_tolerance, hz,
         map=None if s.mapless else unchecked_copy(s.task.world, movers=()),
-        sight=lidar.first(start, turning_room(s.robot.radius)) if lidar and s.mapless else None,
+        sight=senses.lidar.first(start, turning_room(s.robot.radius)) if senses.lidar and s.mapless else None,
         matching=localiser.matched,
         movers=len(trajectories),
         motions=trajectories.positions if perception.kind == "motions" else None,
     )  # fmt: skip
-    movers = MoverSense(trajectories, perception, hz) if s.moving and not tracks_movers else None
-    return Sensors(senses, localiser, lidar, movers), *_mind(s, briefing)
+    return (senses, localiser), *navigator(s, briefing)
 
 
-def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
+def navigator(s: Scenario, briefing: Briefing) -> tuple[OneRoute | Exploration, Driver]:
     """Create the guide and the mind of a robot from a scenario's settings."""
     perception, avoidance, hz = perception_of(s), avoidance_of(s), s.control_hz
     tracks_movers, mapless, moving = perception.kind == "lidar", s.mapless, s.moving
     survey = _survey(s, briefing, tracks_movers) if mapless else None
-    scans = _mover_detector(s) if not mapless and tracks_movers else survey
+    scans = survey or (_mover_detector(s) if tracks_movers else None)
     tracking = scans.tracking if scans else None
-    given = Given(perception, hz, briefing.movers, briefing.motions)
-    movers: PerceivedMovers = Tracked(tracking, perception, hz) if tracking else given
+    movers = PerceivedMovers(perception, briefing.movers, briefing.motions)
+    if tracking:
+        movers = Tracked(tracking, perception)
     # A scan may be one scan period old, and commands are delayed.
     reaction = 1 / hz + (1 / _lidar(s).rate if scans else 0.0) + s.robot.noise.scaled(s.noise).delay
     rules: list[Rule] = [_follow(s, briefing, movers)]
-    guide: RouteGuide
+    guide: OneRoute | Exploration
     if survey:
-        guide = exploration = _exploration(s, survey)
+        guide = exploration = _exploration(s, survey, movers)
         rules.append(TurnToScan(s.robot, hz))
     else:
         guide = _guide(s, movers, moving)
@@ -101,21 +93,19 @@ def _mind(s: Scenario, briefing: Briefing) -> tuple[RouteGuide, Driver]:
     if moving and avoidance is not None and not capabilities_of_controller(s.controller).avoids_movers:
         if not mapless and tracking:  # without a map, the stopping constraint keeps the robot to ground that it sees
             rules.append(SlowAtCorners(tracking, s.robot, hz, reaction))
-        drifts = survey is not None and tracks_movers
-        share = DRIFTING_SHARE if drifts else GOAL_SHARE
-        blind = drifts and not _lidar(s).full_circle
-        backwards = BLIND_SHARE * s.robot.max_speed if blind else math.inf
-        habits = Habits(movers, hz) if movers.uncertain else None
-        delay, losses = s.robot.noise.scaled(s.noise).delay, clearances_off_route(s.robot, s.pursuit, s.noise)
-        rules.append(
-            Avoid(
-                avoidance, movers, s.task, s.robot, hz, goal_share=share, backwards=backwards, delay=delay,
-                losses=losses, habits=habits,
-            )
+        drifts = mapless and tracks_movers
+        avoid = Avoid(
+            avoidance, movers, s.task, s.robot, hz,
+            goal_share=DRIFTING_SHARE if drifts else GOAL_SHARE,
+            backwards=BLIND_SHARE * s.robot.max_speed if drifts and not _lidar(s).full_circle else math.inf,
+            delay=s.robot.noise.scaled(s.noise).delay,
+            losses=clearances_off_route(s.robot, s.pursuit, s.noise),
+            habits=Habits(movers, hz) if movers.uncertain else None,
         )  # fmt: skip
+        rules.append(avoid)
     if survey:
-        rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.note_command))
-    return guide, Driver(briefing, guide, rules, scans, given)
+        rules.append(StoppingConstraint(survey, s.robot, hz, reaction, exploration.recovery.note_command))
+    return guide, Driver(briefing, guide, rules, scans, movers if moving or tracking else None)
 
 
 def perception_of(s: Scenario) -> Perception:
@@ -172,7 +162,7 @@ def avoidance_of(s: Scenario) -> Avoidance | None:
     return dataclasses.replace(s.avoidance, reversal_weight=0.0, horizon=horizon)
 
 
-def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
+def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> OneRoute:
     """Create the guide of a robot with a map."""
     policy, avoidance = s.replanning, avoidance_of(s)
     if policy is None or not moving:
@@ -181,13 +171,12 @@ def _guide(s: Scenario, movers: PerceivedMovers, moving: bool) -> RouteGuide:
     return kind(route_planner(s), policy, movers, s.robot.radius + avoidance.min_clearance if avoidance else 0.0)
 
 
-def _exploration(s: Scenario, survey: Survey) -> Exploration:
+def _exploration(s: Scenario, survey: Survey, movers: PerceivedMovers) -> Exploration:
     """Create the guide of a mapless robot; it plans around tracked movers if the policy says so."""
     policy, ahead = s.replanning, None
     assert policy is not None  # `Scenario` checks that a mapless robot replans
-    if survey.tracking is not None and policy.around_movers:
-        tracked = Tracked(survey.tracking, perception_of(s), s.control_hz)
-        ahead = MoversSeenAhead(tracked, survey, policy, s.robot, s.task.goal, s.inflate, s.control_hz)
+    if isinstance(movers, Tracked) and policy.around_movers:
+        ahead = MoversSeenAhead(movers, survey, policy, s.robot, s.task.goal, s.inflate)
     return Exploration(route_planner(s), survey, policy, ahead)
 
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import TypeAlias
 
-if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
+from antdrive.sim.scenario import Scenario
+from antdrive.sim.settings import SETTINGS
 
 #: Returns why the setting with a key, such as `controller.blend`, cannot act in a scenario; empty if it can.
-Idle: TypeAlias = "Callable[[Scenario, str], str]"
-
-
-def never(s: Scenario, key: str) -> str:
-    """Return no reason: the setting can always act."""
-    return ""
+Idle: TypeAlias = Callable[[Scenario, str], str]
 
 
 def if_timed(s: Scenario, key: str) -> str:
@@ -94,6 +89,41 @@ def without_chance(s: Scenario, key: str) -> str:
     return f"{s.planner_label} and the drive draw no random numbers"
 
 
+#: Why the setting of a field cannot act; the others always can.
+IDLE: Mapping[str, Idle] = {
+    "smoothing": if_timed,
+    "noise": without_noise,
+    "footprint": with_one_shape,
+    "localisation": with_exact_fixes,
+    "odometry": without_odometry,
+    "controller": on_other_routes,
+    "perception": without_choice_of_perception,
+    "avoidance": without_movers,
+    "replanning": without_replans,
+    "seed": without_chance,
+}
+
+
+def idle_settings(s: Scenario, given: Collection[str] = ()) -> dict[str, str]:
+    """Return the settings that cannot act in a scenario: the reason of each by its key.
+
+    >>> idle_settings(Scenario.of("forest", "astar", seed=1))
+    {'seed': 'astar and the drive draw no random numbers'}
+
+    Args:
+        s: the scenario
+        given: keys of settings to include at their defaults; the others are included if they differ
+    """
+    keys = (
+        (name, key)
+        for name in IDLE
+        for one in (SETTINGS[name],)
+        for key in one.keys(getattr(s, name)) or ([one.key] if one.key in given else [])
+    )
+    reasons = {key: IDLE[name](s, key) for name, key in keys}
+    return {key: reason for key, reason in reasons.items() if reason}
+
+
 def idle_notes(scenarios: Sequence[Scenario], given: Collection[str] = ()) -> list[str]:
     """Return a sentence for every setting without effect in some of the scenarios.
 
@@ -103,7 +133,7 @@ def idle_notes(scenarios: Sequence[Scenario], given: Collection[str] = ()) -> li
     """
     found: dict[tuple[str, str], list[str]] = {}
     for s in scenarios:
-        for key, reason in s.idle_settings(given).items():
+        for key, reason in idle_settings(s, given).items():
             found.setdefault((key, reason), []).append(f"{s.task.world.name} with {s.planner_label}")
     return [f"{key} has no effect{_share(places, len(scenarios))}: {reason}" for (key, reason), places in found.items()]
 

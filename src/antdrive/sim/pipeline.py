@@ -18,10 +18,10 @@ from antdrive.robots import Observation, TrackedPath, Twist
 from antdrive.robots.control.observation import finite_twist
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.body import Body
-from antdrive.sim.driving.drive import Progress, drive, ignore_progress
+from antdrive.sim.driving.driver import Progress, ignore_progress
 from antdrive.sim.driving.guide import Follow
-from antdrive.sim.driving.parts import SILENT, Ending, Note
-from antdrive.sim.driving.plants import Bullet, Drive
+from antdrive.sim.driving.parts import SILENT, Drive, Ending, Note
+from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.facts import ENDED_BY as ENDED_BY
 from antdrive.sim.facts import Run as Run
 from antdrive.sim.log.certificate import certify
@@ -39,7 +39,6 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.recording import configuration_of, plan_record
 from antdrive.sim.scenario import Scenario, usual_time_limit
-from antdrive.sim.written import Written
 from antdrive.worlds import Grid
 
 if TYPE_CHECKING:
@@ -180,7 +179,7 @@ class Session:
             outcome=log.outcome,
             reason=log.reason,
             physics=log.physics,
-            written=settings_of(Written.of(s).plain()),
+            written=settings_of(s.written.plain()),
             versions=versions(),
             times=TimesRecord(plan_s=self.plan.wall_s, drive_wall_s=drive_wall_s, replans_s=tuple(guide.walls)),
         )
@@ -231,7 +230,8 @@ def driven(
     s: Scenario, planned: tuple[Grid, PlanResult] | None = None, progress: Progress = ignore_progress
 ) -> tuple[Grid, PlanResult, Rollout | None]:
     """Plan and drive as `run` does; return the grid, the plan, and the log if there is a path."""
-    with Session(s, planned) as session:
-        if session._body is not None:
-            drive(session._body, session.mind, progress)
-    return session.grid, session.plan, session.rollout
+    with Session(s, planned) as drive:
+        drive.mind.progress = progress
+        while not drive.ended:
+            drive.step(*drive.mind.act(drive.observe()))
+    return drive.grid, drive.plan, drive.rollout

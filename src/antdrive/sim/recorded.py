@@ -13,13 +13,13 @@ from antdrive.planners.registry import REGISTRY, registered_name
 from antdrive.robots.robot_file import list_robots
 from antdrive.sim.forms import USUAL_CONTROLLER, name_and_options, require_settings, scenario_fields, written
 from antdrive.sim.log.record import DriveRecord, settings_of
+from antdrive.sim.scenario import Scenario
 from antdrive.sim.settings import SETTINGS
 from antdrive.sim.written import Written, named_planner, named_robot, named_task
 from antdrive.worlds import list_worlds
 
 if TYPE_CHECKING:
     from antdrive.robots import Controller
-    from antdrive.sim.scenario import Scenario
 
 
 def built_in_controller(name: str) -> str | None:
@@ -149,7 +149,7 @@ def rebuilt(
     def at(key: str, problem: str) -> InputError:
         return FieldError(key if key.startswith("planner") else f"record.{key}", problem).as_input()
 
-    return words.scenario(at=at, **made)
+    return Scenario.read(words, at=at, **made)
 
 
 def _settings_in_force(record: DriveRecord) -> dict[str, Any]:

@@ -6,8 +6,9 @@ import dataclasses
 import hashlib
 import json
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,8 @@ from antdrive.base.components import is_built_in
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_position
 from antdrive.base.user_code import is_user_code, module_hash
-from antdrive.planners import Planner, capabilities_of
-from antdrive.robots import Controller, PurePursuit, RobotSpec, capabilities_of_controller, overlap_at
+from antdrive.planners import Planner, capabilities_of, load_planner, record_name
+from antdrive.robots import Controller, PurePursuit, RobotSpec, capabilities_of_controller, load_robot, overlap_at
 from antdrive.robots.control.speed_limits import heading_error, steady
 from antdrive.robots.controllers.registry import REGISTRY as CONTROLLER_REGISTRY
 from antdrive.robots.default_margin import default_margin, outline_margins
@@ -35,6 +36,7 @@ from antdrive.sim.log.record import (
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import Perception, usual_perception
 from antdrive.sim.settings import SETTINGS, SLOWEST_CONTROL, Settings, part_of_key
+from antdrive.sim.written import ErrorAt, Written, named_planner, named_robot, named_task, placed
 from antdrive.worlds import Disc, Task, Trajectories, World
 from antdrive.worlds.svg import card, world_svg
 
@@ -42,6 +44,11 @@ DRIFTING = "odometry", "matching"  # localisation without fixes
 KEY_DIGITS = 32  # hexadecimal digits of a key; two of 10^9 runs collide with probability 1e-21
 FINE = 0.05  # largest planning cell without a map [m]
 NO_LIDAR = "has no lidar; add one to its file, or drive jackal or turtlebot4"
+
+
+def unchosen(s: Scenario) -> Scenario:
+    """Leave a margin that is to be chosen at zero, which suffices for checks."""
+    return s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,8 +192,6 @@ class Scenario(Settings):
             InputError: a world, planner, option or robot is unknown, or a file is invalid.
             ValueError: a setting is out of range, the robot does not fit, or `options` are given for a planner object.
         """
-        from antdrive.sim.written import Written
-
         for name in settings:
             if name not in {one.name for one in dataclasses.fields(cls)}:
                 raise FieldError(name, f"unknown setting; {suggest(name, SETTINGS)}")
@@ -201,7 +206,63 @@ class Scenario(Settings):
                 words[key] = os.fspath(value)
             else:
                 words[key], made[name] = "", value
-        return Written(**words).scenario(**settings, **made)
+        return cls.read(Written(**words), **settings, **made)
+
+    @classmethod
+    def read(
+        cls,
+        words: Written,
+        home: Path | None = None,
+        at: ErrorAt | None = None,
+        *,
+        choose: Callable[[Scenario], Scenario] = unchosen,
+        **made: Any,
+    ) -> Scenario:
+        """Return the scenario of words.
+
+        Args:
+            words: the scenario as written
+            home: base of relative paths
+            at: returns the error for a key; None: errors are those of the values
+            choose: chooses the margin `auto`
+            made: fields of the scenario that exist already, such as its task; the words of those without are empty
+
+        Raises:
+            InputError: something does not exist, or a value is invalid.
+        """
+        from antdrive.sim.forms import scenario_fields
+
+        auto = words.settings.get("margin") == "auto" and "margin" not in made
+        with placed(at):
+            known = {key: value for key, value in words.settings.items() if key not in made}
+            fields = scenario_fields({**known, **({"margin": 0.0} if auto else {})}, home)
+            fields |= {"seed": words.seed, "planner_name": record_name(words.planner), **made}
+            if "task" not in made:
+                fields["task"] = words.load_task(home)
+            if "planner" not in made:
+                fields["planner"] = load_planner(words.planner, home, **words.options)
+            if "robot" not in made:
+                fields["robot"] = load_robot(words.robot, home)
+            here = words if home is None else words.seen_from_here(home)
+            options = {key: getattr(fields["planner"], key, value) for key, value in words.options.items()}  # not text
+            here = dataclasses.replace(here, options=options)
+            names = {"task": here.world, "planner": here.planner, "robot": here.robot}
+            named = {part: (fields[part], here.words_of(part)) for part, word in names.items() if word}
+            s = cls(**fields, named_as=named)
+            return choose(s) if auto else s
+
+    @property
+    def written(self) -> Written:
+        """The scenario as a person writes it; parts made in Python are files named after them."""
+        from antdrive.sim.forms import written
+
+        words: dict[str, Any] = {}
+        for part, named in (("task", named_task), ("planner", named_planner), ("robot", named_robot)):
+            made, known = self.named_as.get(part, (None, {}))
+            words |= known if made is getattr(self, part) else named(getattr(self, part), self.planner_label)
+        settings = written(lambda name: getattr(self, name)) | ({} if self.chosen is None else {"margin": "auto"})
+        settings.pop("seed", None)
+        return Written(**words, settings=settings, seed=int(self.seed))
 
     def identity(self, **known: Any) -> str:
         """Return everything that the drive depends on, except its seed, as JSON text.
@@ -424,23 +485,6 @@ class Scenario(Settings):
     def drifting(self) -> bool:
         """Whether the pose comes from odometry, whose errors accumulate."""
         return self.localisation in DRIFTING
-
-    def idle_settings(self, given: Collection[str] = ()) -> dict[str, str]:
-        """Return the settings that cannot act in this scenario: the reason of each by its key.
-
-        >>> Scenario.of("forest", "astar", seed=1).idle_settings()
-        {'seed': 'astar and the drive draw no random numbers'}
-
-        Args:
-            given: keys of settings to include at their defaults; the others are included if they differ
-        """
-        keys = (
-            (one, key)
-            for one in SETTINGS.values()
-            for key in one.keys(getattr(self, one.name)) or ([one.key] if one.key in given else [])
-        )
-        reasons = {key: one.setting.idle(self, key) for one, key in keys}
-        return {key: reason for key, reason in reasons.items() if reason}
 
     def rng(self, purpose: str) -> np.random.Generator:
         """Return the random stream of a purpose. Streams of different purposes are independent."""

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 from annotated_types import Ge, Gt, Le
 
 from antdrive.base.errors import FieldError
-from antdrive.sim import idle_settings
 from antdrive.sim.policy import Perception, ReplanPolicy
 
 if TYPE_CHECKING:
@@ -53,7 +52,6 @@ class Setting:
     usual: str = ""  # meaning of the default None, for `--help`
     # version of the campaign-key format that added the setting; settings added after version 1 are omitted at their default
     since: int = 1
-    idle: idle_settings.Idle = idle_settings.never  # why it cannot act in a scenario
 
 
 def _pursuit() -> "PurePursuit":
@@ -86,7 +84,6 @@ class Settings:
         "KIND",
         choices=SMOOTHINGS,
         axis=True,
-        idle=idle_settings.if_timed,
     )
     noise: float = setting(
         0.0,
@@ -95,7 +92,6 @@ class Settings:
         "FACTOR",
         Ge(0),
         axis=True,
-        idle=idle_settings.without_noise,
     )
     margin: float | None = setting(
         None,
@@ -126,7 +122,6 @@ class Settings:
         "auto|disc|exact",
         choices=FOOTPRINTS,
         since=2,
-        idle=idle_settings.with_one_shape,
     )
     map: str = setting(
         "given",
@@ -144,7 +139,6 @@ class Settings:
         "KIND",
         choices=LOCALISATIONS,
         since=2,
-        idle=idle_settings.with_exact_fixes,
     )
     odometry: float = setting(
         1.0,
@@ -153,7 +147,6 @@ class Settings:
         "FACTOR",
         Ge(0),
         since=2,
-        idle=idle_settings.without_odometry,
     )
     controller: "Controller" = setting(  # noqa: RUF009
         _pursuit,
@@ -163,7 +156,6 @@ class Settings:
         "NAME",
         usual="pure-pursuit",
         form="controller",
-        idle=idle_settings.on_other_routes,
     )
     perception: Perception | None = setting(  # noqa: RUF009
         None,
@@ -174,7 +166,6 @@ class Settings:
         key="sees",
         form="perception",
         usual="velocities; lidar without a map",
-        idle=idle_settings.without_choice_of_perception,
     )
     avoidance: "Avoidance | None" = setting(  # noqa: RUF009
         _avoidance,
@@ -182,7 +173,6 @@ class Settings:
         "Movers",
         key="avoid",
         form="avoidance",
-        idle=idle_settings.without_movers,
     )
     replanning: ReplanPolicy | None = setting(  # noqa: RUF009
         ReplanPolicy,
@@ -191,7 +181,6 @@ class Settings:
         "Movers",
         key="replan",
         form="replanning",
-        idle=idle_settings.without_replans,
     )
     unseen: "tuple[Disc, ...]" = setting(  # noqa: RUF009
         (), "cylinders {x, y, radius} [m] unknown to planner and controller", "World", "X,Y,RADIUS", form="discs"
@@ -229,7 +218,6 @@ class Settings:
         Ge(0),
         Le(2**63 - 1),
         axis=True,
-        idle=idle_settings.without_chance,
     )
 
     def __post_init__(self) -> None:

@@ -19,7 +19,6 @@ from antdrive.sim.settings import SETTINGS
 if TYPE_CHECKING:
     from antdrive.planners import Planner
     from antdrive.robots import RobotSpec
-    from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Task
 
 #: Returns the error for a key and its problem, with the key's place: a file and its line, or an option.
@@ -34,11 +33,6 @@ def placed(at: ErrorAt | None) -> Iterator[None]:
     except (FieldError, InputError) as error:
         has_place = isinstance(error, InputError) and not error.key
         raise error if at is None or has_place else at(error.key, error.problem) from None
-
-
-def unchosen(s: Scenario) -> Scenario:
-    """Leave a margin that is to be chosen at zero, which suffices for checks."""
-    return s
 
 
 _KINDS: Mapping[str, Any] = {"start": (list, tuple), "goal": (list, tuple), "task": str, "robot": str, "seed": int}
@@ -118,49 +112,6 @@ class Written:
             "seed": self.seed,
         }
 
-    def scenario(
-        self,
-        home: Path | None = None,
-        at: ErrorAt | None = None,
-        *,
-        choose: Callable[[Scenario], Scenario] = unchosen,
-        **made: Any,
-    ) -> Scenario:
-        """Return the scenario.
-
-        Args:
-            home: base of relative paths
-            at: returns the error for a key; None: errors are those of the values
-            choose: chooses the margin `auto`
-            made: fields of the scenario that exist already, such as its task; the words of those without are empty
-
-        Raises:
-            InputError: something does not exist, or a value is invalid.
-        """
-        from antdrive.planners import load_planner, record_name
-        from antdrive.robots import load_robot
-        from antdrive.sim import Scenario  # which is built of words
-        from antdrive.sim.forms import scenario_fields
-
-        auto = self.settings.get("margin") == "auto" and "margin" not in made
-        with placed(at):
-            known = {key: value for key, value in self.settings.items() if key not in made}
-            fields = scenario_fields({**known, **({"margin": 0.0} if auto else {})}, home)
-            fields |= {"seed": self.seed, "planner_name": record_name(self.planner), **made}
-            if "task" not in made:
-                fields["task"] = self.load_task(home)
-            if "planner" not in made:
-                fields["planner"] = load_planner(self.planner, home, **self.options)
-            if "robot" not in made:
-                fields["robot"] = load_robot(self.robot, home)
-            here = self if home is None else self.seen_from_here(home)
-            options = {key: getattr(fields["planner"], key, value) for key, value in self.options.items()}  # not text
-            here = dataclasses.replace(here, options=options)
-            words = {"task": here.world, "planner": here.planner, "robot": here.robot}
-            named = {part: (fields[part], here._words_of(part)) for part, word in words.items() if word}
-            s = Scenario(**fields, named_as=named)
-            return choose(s) if auto else s
-
     def check_names(self, home: Path | None, at: ErrorAt) -> None:
         """Check that everything named exists, without reading worlds and robots or running user code.
 
@@ -223,26 +174,10 @@ class Written:
         except InputError as error:
             raise FieldError("world", str(error)) from None
 
-    def _words_of(self, part: str) -> dict[str, Any]:
+    def words_of(self, part: str) -> dict[str, Any]:
         """Return the fields that name a part of a scenario: its task, planner or robot."""
         keys = {"task": ("world", "task", "start", "goal"), "planner": ("planner", "options"), "robot": ("robot",)}
         return {key: getattr(self, key) for key in keys[part]}
-
-    @classmethod
-    def of(cls, s: Scenario) -> Written:
-        """Return a scenario as written; parts made in Python are files named after them.
-
-        Args:
-            s: the scenario
-        """
-        from antdrive.sim.forms import written
-
-        words: dict[str, Any] = {}
-        for part, named in (("task", named_task), ("planner", named_planner), ("robot", named_robot)):
-            made, known = s.named_as.get(part, (None, {}))
-            words |= known if made is getattr(s, part) else named(getattr(s, part), s.planner_label)
-        settings = written(lambda name: getattr(s, name)) | ({} if s.chosen is None else {"margin": "auto"})
-        return cls(**words, settings={key: value for key, value in settings.items() if key != "seed"}, seed=int(s.seed))
 
     def command(self) -> str | None:
         """Return the command that drives the scenario; None if the command line has no option for a setting."""

@@ -155,7 +155,8 @@ def test_movers_are_predicted_as_the_perception_allows(tick, told):
     movers = (CROSSING, Cruising(radius=0.2, position=(2.0, 2.0), velocity=(0.5, 0.3)))
     traffic = Trajectories.of(replace(HALL, movers=movers), (1.0, 3.0))
     ahead = Avoidance().prediction_times
-    places, radii = GroundTruth(traffic, Perception(kind=told), 60).predict(tick, (0.0, 0.0), ahead)
+    truth = GroundTruth(traffic, Perception(kind=told)).at(tick)
+    places, radii = truth.predict(ahead), truth.near.radii
     now, speed = traffic.positions(tick / 60)[0], traffic.velocities(tick / 60)[0]
     expected = {
         "positions": np.repeat(now[None], len(ahead), axis=0),

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from antdrive.base import FieldError
 from antdrive.planners import Query, load_planner, smooth
 from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, Noise, PurePursuit, PursuitState, Twist, load_robot
-from antdrive.robots.control.observation import Briefing, Observation
+from antdrive.robots.control.observation import NOBODY, Briefing, Observation
 from antdrive.robots.noise import moved_by
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.compose import BLIND_SHARE, compose
@@ -165,8 +165,10 @@ def test_a_robot_brakes_for_a_scan_turn_and_where_it_is_lost(turtlebot):
 
 
 def test_progress_is_a_fraction_of_the_route(turtlebot):
-    half = driver(turtlebot)
-    assert at(half, half.way.path.length / 2).fraction == pytest.approx(0.5)
+    half, told = driver(turtlebot), []
+    half.rules, half.progress = (), told.append
+    at(half, half.way.path.length / 2).act(seen())
+    assert told == [0.5]
 
 
 def test_turns_on_the_spot_add_the_time_of_a_full_turn_to_the_stuck_time(turtlebot):
@@ -195,7 +197,7 @@ def test_a_mover_beside_the_goal_closes_no_cell_within_the_inflation_of_it():
             mover = Keyframed(radius=0.5, keyframes=((0.0, x, y), (9.0, x, y)))
             still = GroundTruth(Trajectories.of(World("w", HALL.bounds, movers=(mover,)), (1.0, 3.0)), Perception(), 60)
             grid = hall_grid()
-            discs = covered_discs(still, 0, np.array([(1.0, 3.0), goal]), 0.0, grid)
+            discs = covered_discs(still, np.array([(1.0, 3.0), goal]), 0.0, grid)
             assert discs
             assert discs[0].radius == pytest.approx(0.6 - grid.inflate - grid.cell)
             assert not blocked_cells(grid, discs)[grid.cell_at(*goal)]
@@ -253,6 +255,7 @@ def test_a_robot_without_a_map_backs_off_slowly_into_its_blind_sector(jackal, tu
         noted = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
         monkeypatch.setattr("antdrive.sim.compose.avoidance_of", lambda _, noted=noted: noted)
         rule = next(rule for rule in compose(unknown)[2].rules if type(rule) is Avoid)
+        rule._movers.read(seen())
         rule.apply(Moment(seen(), driver(robot).way, Step(), StuckClock()), Step())
         slow = robot is jackal and perception.kind == "lidar"
         assert asked == [BLIND_SHARE * robot.max_speed if slow else math.inf]
@@ -304,7 +307,7 @@ def test_movers_close_neither_the_robots_position_nor_the_goal():
     predictor = GroundTruth(Trajectories.of(world, TASK.start[:2]), Perception(), 60)
     grid = hall_grid()
     ends = np.array([TASK.start[:2], TASK.goal])
-    discs = covered_discs(predictor, 0, ends, 1.0, grid)
+    discs = covered_discs(predictor, ends, 1.0, grid)
     blocked = blocked_cells(grid, discs)
     for end in ends:
         assert not blocked[grid.cell_at(*end)]
@@ -356,7 +359,7 @@ def test_stopping_takes_as_long_as_the_slower_of_speed_and_turn(turtlebot):
 
 def test_a_robot_that_gives_way_is_not_stuck(turtlebot):
     none = np.empty((0, 2))
-    nobody = SimpleNamespace(predict=lambda *_: (np.stack([none, none]), np.empty(0)), velocities=lambda *_: none)
+    nobody = SimpleNamespace(predict=lambda *_: np.stack([none, none]), near=NOBODY)
     cautious = SimpleNamespace(
         prediction_times=np.array([0.0, 0.1]),
         step=0.1,
@@ -395,8 +398,6 @@ def test_a_robot_waits_if_it_stands_to_give_way(turtlebot, avoids, speed, waits)
 
 class EndsAt:
     """Gives up in one control period, and notes for which period the reason is asked."""
-
-    progress_periods, fraction = 6, 0.0
 
     def __init__(self, tick, command):
         self._tick, self._command, self.asked = tick, command, []
@@ -469,11 +470,10 @@ def test_a_robot_steers_from_where_it_will_be_when_its_next_command_takes_effect
 
 
 def test_progress_is_reported_ten_times_a_second(turtlebot):
-    told = []
-    with Engine(TASK.world, turtlebot) as engine:
-        tracked = driver(turtlebot).way.path
-        log = follow(engine, PurePursuit(), tracked, TASK, limit=1.0, progress=told.append)
-    assert len(log.t) == 241
+    told, robot = [], driver(turtlebot)
+    robot.progress = told.append
+    plant = Kinematic(TASK.start, 1 / 60, turtlebot)
+    drive(Body(plant, Senses(), Exact(TASK.start, 1 / 60), hz=60, limit=1.0), robot)
     assert len(told) == 10
     assert told == sorted(told)
 

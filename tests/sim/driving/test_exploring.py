@@ -33,6 +33,7 @@ from antdrive.sim.sensing import Scanner
 from antdrive.views.map_reconstruction import MapReconstruction
 from antdrive.worlds import Cruising, Disc, Route, Task, World, generate, load_task, rasterise
 from tests.records import changed
+from tests.sim.driving.ground_truth import moment
 from tests.worlds.oracles import segment_distances
 
 POSTS = tuple(Disc(3.0, 0.15 * k, 0.075) for k in range(14))  # a row that leaves a gap at the top
@@ -280,7 +281,7 @@ def own_map(log):
     for row in range(0, len(log.t), log.record.physics_hz // log.record.control_hz):
         tick = row * log.record.control_hz // log.record.physics_hz
         estimate = tuple(log.estimate[row].tolist()) if len(log.estimate) else tuple(log.pose[row].tolist())
-        ranges = sensors.lidar.scan(tick, tuple(log.pose[row].tolist()))
+        ranges = sensors[0].lidar.scan(tick, tuple(log.pose[row].tolist()))
         if ranges is not None:
             survey.read(tick, estimate, ranges)
         resets.get(tick, lambda pose: None)(estimate)
@@ -405,7 +406,7 @@ def test_plans_that_failed_long_ago_are_no_reason(jackal):
     exploration.survey.map.discs = lambda bounds: closed
     said = []
     for tick in (60, 90, 120):
-        assert exploration.replan(tick, TASK.start, "no way") is None
+        assert exploration.replan(moment(tick, TASK.start), "no way") is None
         said.append(exploration.failure_note(tick))
     assert said == ["", "", "no way through what was seen, last at t = 2.0 s"]
     assert exploration.failure_note(120 + 30 * 60)
@@ -420,7 +421,7 @@ def test_a_map_counts_the_scans_that_are_taken(jackal, rate, share):
     survey = mind.scans
     assert survey.map.share == share
     for tick in range(61):
-        ranges = sensors.lidar.scan(tick, TASK.start)
+        ranges = sensors[0].lidar.scan(tick, TASK.start)
         if ranges is not None:
             survey.read(tick, TASK.start, ranges)
     assert len(survey.scans) == pytest.approx(min(rate, 60), abs=1)
@@ -520,7 +521,7 @@ def test_a_robot_without_a_path_at_the_end_of_its_route_keeps_searching_for_a_wh
     robot = Driver(Briefing(jackal, task.start, task.goal, task.goal_tolerance, 60), exploration, ())
     robot.way = Follow(tracked)
     asked = []
-    exploration.replan = lambda tick, pose, trigger: asked.append(trigger)
+    exploration.replan = lambda now, trigger: asked.append(trigger)
     exploration.lost = lost
     robot.step = Step(pursuit=PursuitState(arc=tracked.length))
     exploration.trigger = lambda *_: ""
@@ -574,13 +575,13 @@ def test_a_blocked_scan_turn_ends(turtlebot):
 def survey_of(robot, left, right, open_=1.0):
     """A survey that sees so much free ground for turns, and none ahead, where nothing was hit for so far."""
     turns = {1.0: left, -1.0: right}
-    return SimpleNamespace(
-        lidar=robot.lidar,
-        map=SimpleNamespace(share=1, stride=1),
-        clear_turn=lambda pose, side, farthest: min(turns[side], farthest),
-        clear_distance=lambda pose, speed, rate, longest: 0.0,
-        clear_way=lambda pose, twist, farthest, freespace: open_ if freespace else 0.0,
-    )
+
+    def clear_way(pose, speed, rate, farthest, freespace=False):
+        if speed:
+            return open_ if freespace else 0.0
+        return min(turns[rate], farthest)
+
+    return SimpleNamespace(lidar=robot.lidar, map=SimpleNamespace(share=1, stride=1), clear_way=clear_way)
 
 
 @pytest.mark.parametrize(
@@ -667,10 +668,10 @@ def test_unknown_ground_is_distinguished_from_hits(jackal):
     task = Task(World("hall", OPEN, (Disc(4.8, 4.0, 0.2),)), HERE, (7.0, 4.0), goal_tolerance=0.25, cell=0.1)
     s = Scenario.of(task, "astar", jackal, map="none")
     exploration = compose(s)[1]
-    survey, recovery = exploration.survey, exploration._recovery
+    survey, recovery = exploration.survey, exploration.recovery
     for twist, unseen in ((FORWARD, False), (Twist(-0.5, 0.0), True), (Twist(0.001, 1.0), False)):
         recovery.note_command(0.0, twist)
-        seen, open_ = survey.clear_way(HERE, twist, 1.0), survey.clear_way(HERE, twist, 1.0, freespace=True)
+        seen, open_ = (survey.clear_way(HERE, *twist, 1.0, freespace=open_) for open_ in (False, True))
         assert seen <= open_
         assert recovery.held_by_unknown(HERE) == unseen, (twist, seen, open_)
 

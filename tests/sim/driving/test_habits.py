@@ -18,7 +18,7 @@ def predicted(t, *movers, hz=HZ, perception=None):
     truth = GroundTruth(Trajectories.of(world, (9.0, 9.0), 0), perception or Perception(), hz)
     habits = Habits(truth, hz)
     for tick in range(round(t * hz) + 1):
-        others, radii = habits.predict(tick, (5.0, 2.0), AHEAD, *truth.predict(tick, (5.0, 2.0), AHEAD))
+        others, radii = habits.predict(AHEAD, truth.at(tick, (5.0, 2.0)).predict(AHEAD))
     return others, radii
 
 

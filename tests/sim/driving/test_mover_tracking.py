@@ -25,6 +25,7 @@ from antdrive.sim.recorded import rebuilt
 from antdrive.sim.sensing import KnownGround, Scanner
 from antdrive.worlds import Disc, Keyframed, Route, Task, World
 from tests.records import COARSE, changed
+from tests.sim.driving.ground_truth import observed
 
 pytestmark = pytest.mark.xdist_group("tracking by lidar")
 
@@ -134,17 +135,17 @@ def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal):
     for tick in range(31):
         places = np.array([[3.0 - tick / 60, 1.0], [2.0, -2.0]])
         tracking.read(ground, (0.0, 0.0, 0.0), scanner.scan((0.0, 0.0, 0.0), places, np.array([0.3, 0.2])), tick)
-    predictor = Tracked(tracking, LIDAR, 60)
-    places, radii = predictor.predict(36, (0.0, 0.0), np.array([0.0, 1.0]))
-    numbers, everywhere = predictor.perceived(36, (0.0, 0.0))
+    movers = Tracked(tracking, LIDAR)
+    movers.read(observed(36))
+    places, radii, numbers = movers.predict(np.array([0.0, 1.0])), movers.near.radii, movers.near.numbers
     first = int(np.argmin(places[0, :, 1] < 0))
     assert np.allclose(places[:, first], [[2.4, 1.0], [1.4, 1.0]], atol=0.05)
     assert np.array_equal(places[0, 1 - first], places[1, 1 - first])  # it stands
     assert radii[first] == pytest.approx(0.3, abs=0.03)
-    assert np.array_equal(everywhere[numbers], places[0])
-    assert predictor.radius_of(int(numbers[first])) == radii[first]
-    near = Tracked(tracking, Perception(kind="lidar", range=2.3), 60)
-    assert near.within_range(36, (0.0, 0.0)).tolist() == [numbers[first]]
+    assert np.array_equal(movers.places[numbers], places[0])
+    near = Tracked(tracking, Perception(kind="lidar", range=2.3))
+    near.read(observed(36))
+    assert near.near.numbers.tolist() == [numbers[first]]
     assert math.hypot(2.0, 2.0) - 0.2 > 2.3
 
 

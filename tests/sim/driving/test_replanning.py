@@ -31,7 +31,7 @@ from antdrive.sim.log.metrics import tracking_error_max_m
 from antdrive.worlds import Disc, Keyframed, Route, Task, World, polyline_clearance
 from antdrive.worlds.world import by_geometry
 from tests.records import COARSE, changed
-from tests.sim.driving.ground_truth import GroundTruth
+from tests.sim.driving.ground_truth import GroundTruth, moment
 
 # A wall with two gates; the path through the nearer gate is shorter.
 POSTS = tuple(Disc(4.0, y, 0.25) for y in np.arange(0.25, 6.0, 0.5) if not (2.2 < y < 3.8 or y > 5.0))
@@ -194,46 +194,54 @@ def monitor_of(*movers, robot, planner="dstar-lite", **settings):
     policy = ReplanPolicy(**settings)
     s = Scenario.of(task, planner, robot, avoidance=None, replanning=policy)
     truth = GroundTruth(s.trajectories, s.known_perception, s.control_hz)
-    with mock.patch("antdrive.sim.compose.Given", return_value=truth):
+    with mock.patch("antdrive.sim.compose.PerceivedMovers", return_value=truth):
         made = compose(s)[1]
     return made, made.route(*made.first())[1]
 
 
+def now(made, tick, pose, tracked=None, arc=0.0, waiting=False):
+    made._movers.at(tick, pose[:2])
+    return moment(tick, pose, tracked, arc, waiting)
+
+
 def test_a_robot_too_far_off_its_route_has_strayed(turtlebot):
     made, tracked = monitor_of(ASIDE, robot=turtlebot)
-    assert made.trigger(0, (1.5, 3.7, 0.0), False, tracked, 0.5) == ""
-    assert made.trigger(0, (1.5, 3.8, 0.0), False, tracked, 0.5) == "strayed"
-    assert made.trigger(0, (7.0, 3.3, 0.0), False, tracked, tracked.length - 0.1) == "", (
+    assert made.trigger(now(made, 0, (1.5, 3.7, 0.0), tracked, 0.5)) == ""
+    assert made.trigger(now(made, 0, (1.5, 3.8, 0.0), tracked, 0.5)) == "strayed"
+    assert made.trigger(now(made, 0, (7.0, 3.3, 0.0), tracked, tracked.length - 0.1)) == "", (
         "the end is 0.3 m away where 0.1 m of the route remain"
     )
-    assert made.trigger(0, (7.0, 3.4, 0.0), False, tracked, tracked.length - 0.1) == "strayed"
+    assert made.trigger(now(made, 0, (7.0, 3.4, 0.0), tracked, tracked.length - 0.1)) == "strayed"
 
 
 def test_a_replan_from_an_impossible_pose_is_logged_as_failed(turtlebot):
     made, _ = monitor_of(ASIDE, robot=turtlebot)
-    assert made.replan(0, (-1.0, 3.0, 0.0), "strayed") is None
+    assert made.replan(now(made, 0, (-1.0, 3.0, 0.0)), "strayed") is None
     assert [(replan.trigger, replan.solved, replan.cost_m) for replan in made.log] == [("strayed", False, None)]
 
 
 def test_two_replans_are_at_least_the_minimum_interval_apart(turtlebot):
     made, tracked = monitor_of(PASSING, robot=turtlebot, min_interval=1.0, obstruction_range=0.0)
     astray = (1.5, 3.8, 0.0)
-    assert made.replan(0, astray, "strayed") is not None
-    assert [made.trigger(tick, astray, False, tracked, 0.5) for tick in (1, 59, 60)] == ["", "", "strayed"]
+    assert made.replan(now(made, 0, astray), "strayed") is not None
+    assert [made.trigger(now(made, tick, astray, tracked, 0.5)) for tick in (1, 59, 60)] == ["", "", "strayed"]
 
 
 def test_only_waiting_without_interruption_triggers_a_replan(turtlebot):
     made, tracked = monitor_of(ASIDE, robot=turtlebot, max_wait=2.0)
-    causes = [made.trigger(tick, TASK.start, tick != 60, tracked, 0.0) for tick in range(240)]
+    causes = [made.trigger(now(made, tick, TASK.start, tracked, 0.0, waiting=tick != 60)) for tick in range(240)]
     assert causes.index("waited") == 61 + 120
     never, tracked = monitor_of(ASIDE, robot=turtlebot, around_movers=False)
-    assert not any(never.trigger(tick, TASK.start, True, tracked, 0.0) for tick in range(240))
+    assert not any(never.trigger(now(never, tick, TASK.start, tracked, 0.0, waiting=True)) for tick in range(240))
 
 
 @pytest.mark.parametrize("planner", ["dstar-lite", "ants", "tangent"])
 def test_cells_that_a_mover_has_left_are_free_again(planner, turtlebot):
     made, _ = monitor_of(PASSING, robot=turtlebot, planner=planner)
-    first, again = made.replan(0, TASK.start, "obstructed"), made.replan(360, TASK.start, "obstructed")
+    first, again = (
+        made.replan(now(made, 0, TASK.start), "obstructed"),
+        made.replan(now(made, 360, TASK.start), "obstructed"),
+    )
     beside = World("mover", HALL.bounds, (Disc(4.0, 3.0, 0.45),))
     assert polyline_clearance(beside, first.route.xy) > 0.2
     assert again.length < 6.05
@@ -255,12 +263,12 @@ WALKING = Keyframed(radius=0.3, keyframes=((0.0, 4.0, 1.0), (8.0, 4.0, 5.0)), lo
 def test_waiting_for_a_walking_mover_is_quicker_than_a_long_route(mover, trigger, around, quicker, turtlebot):
     """The robot waits for 2 s at most, in which it drives 1.4 m."""
     made, _ = monitor_of(mover, robot=turtlebot)
-    assert made._ahead.waiting_is_quicker(0, TASK.start, trigger, 0.7, around, 6.0) is quicker
+    assert made._ahead.waiting_is_quicker(trigger, 0.7, around, 6.0) is quicker
 
 
 def test_a_policy_can_ignore_movers(turtlebot):
     made, _ = monitor_of(PASSING, robot=turtlebot, around_movers=False)
-    straight = made.replan(0, TASK.start, "strayed")
+    straight = made.replan(now(made, 0, TASK.start), "strayed")
     assert straight.length < 6.05
 
 
@@ -269,7 +277,7 @@ def test_a_mover_at_the_goal_does_not_block_the_plan(planner, turtlebot):
     """It may have left by the time the robot arrives; otherwise the robot avoids it."""
     mover = Keyframed(radius=0.3, keyframes=((0.0, 7.1, 3.0), (100.0, 7.1, 3.01)), loop="once")
     made, _ = monitor_of(mover, robot=turtlebot, planner=planner)
-    tracked = made.replan(0, TASK.start, "strayed")
+    tracked = made.replan(now(made, 0, TASK.start), "strayed")
     assert tracked.route.xy[-1] == pytest.approx(TASK.goal)
 
 
@@ -277,9 +285,9 @@ def test_a_late_robot_plans_in_time_again_from_where_it_is(turtlebot):
     made, tracked = monitor_of(GATEKEEPER, robot=turtlebot, planner="sipp")
     on_time = made.schedule.due(20.0)
     place = (float(np.interp(on_time, tracked.route.arc, tracked.route.xy[:, 0])), 3.0, 0.0)
-    assert made.trigger(1200, place, False, tracked, on_time - MAX_LAG + 0.01) == ""
-    assert made.trigger(1200, place, False, tracked, on_time - MAX_LAG - 0.01) == "late"
-    assert made.replan(1200, TASK.start, "late") is not None
+    assert made.trigger(now(made, 1200, place, tracked, on_time - MAX_LAG + 0.01)) == ""
+    assert made.trigger(now(made, 1200, place, tracked, on_time - MAX_LAG - 0.01)) == "late"
+    assert made.replan(now(made, 1200, TASK.start), "late") is not None
     assert made.schedule.t[0] == pytest.approx(20.0)
 
 

@@ -64,7 +64,7 @@ def driven(robot, world, start, wanted, hz, held, *, told=None):
 
 def limited(last, command, free):
     """What becomes of a command where `free` metres or radians are observed as free, with 0.1 s to react."""
-    survey = SimpleNamespace(clear_distance=lambda *_: free, clear_turn=lambda *_: free)
+    survey = SimpleNamespace(clear_way=lambda *_: free)
     return StoppingConstraint(survey, ROBOT, 20, 0.1, lambda *noted: None).limit((0.0, 0.0, 0.0), last, command)
 
 
@@ -105,8 +105,8 @@ def test_a_command_that_the_constraint_stops_is_noted(left, slowed, stands):
     noted, wanted = [], Step(Twist(0.3, 0.1), PursuitState())
     caution = StoppingConstraint(None, ROBOT, 20, 0.1, lambda *note: noted.append(note))
     caution.limit = lambda pose, last, command: (Twist(*left), slowed)
-    found = caution.apply(SimpleNamespace(tick=7, pose=(0.0, 0.0, 0.0), before=wanted), wanted)
-    assert [note[:2] for note in noted] == [(7, wanted.command if stands else None)]
+    found = caution.apply(SimpleNamespace(observed=SimpleNamespace(t=0.7), pose=(0.0, 0.0, 0.0), before=wanted), wanted)
+    assert [note[:2] for note in noted] == [(0.7, wanted.command if stands else None)]
     assert found == (Step(Twist(*left), PursuitState(limiter=SIGHT_LIMIT)) if slowed else wanted)
 
 
@@ -116,8 +116,11 @@ def test_only_a_robot_that_its_controller_stops_is_idle(command, marks):
     noted = []
     caution = StoppingConstraint(None, ROBOT, 20, 0.1, lambda *note: noted.append(note))
     caution.limit = lambda pose, last, command: (command, False)
-    caution.apply(SimpleNamespace(tick=7, pose=(0.0, 0.0, 0.0), before=Step()), Step(command, PursuitState(), **marks))
-    assert noted == [(7, None, command == Twist(0.0, 0.0) and not marks)]
+    caution.apply(
+        SimpleNamespace(observed=SimpleNamespace(t=0.7), pose=(0.0, 0.0, 0.0), before=Step()),
+        Step(command, PursuitState(), **marks),
+    )
+    assert noted == [(0.7, None, command == Twist(0.0, 0.0) and not marks)]
 
 
 @pytest.mark.parametrize("arc", ARCS)
@@ -219,9 +222,9 @@ def test_a_robot_that_resets_its_map_turns_over_no_known_post(beside):
         x = min(3.0, 1.5 + 0.01 * tick)
         if robot.lidar.due(tick, 50):
             survey.read(tick, (x, 2.0, 0.0), scanner.scan((x, 2.0, 0.0)))
-    known = survey.clear_turn(here, 1.0, math.pi)
+    known = survey.clear_way(here, 0.0, 1.0, math.pi)
     survey.reset(here)
-    turn = survey.clear_turn(here, 1.0, math.pi)
+    turn = survey.clear_way(here, 0.0, 1.0, math.pi)
     if beside is None:
         assert turn == known == math.pi
         return

@@ -23,12 +23,12 @@ from antdrive.sim.driving.movers_ahead import (
     Traffic,
     Zone,
 )
-from antdrive.sim.driving.perceived_movers import Tracked
+from antdrive.sim.driving.perceived_movers import PerceivedMovers, Tracked
 from antdrive.sim.policy import Trigger
 from antdrive.sim.sensing import TrackedMovers
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, World, import_dynabarn, rasterise
 from tests.records import COARSE, changed
-from tests.sim.driving.ground_truth import GroundTruth
+from tests.sim.driving.ground_truth import GroundTruth, observed
 from tools.shared_data import DYNABARN
 
 HALL = World("hall", (0.0, 0.0, 16.0, 12.0))
@@ -49,8 +49,12 @@ SLOW = tuple(shuttle(3.0 + 0.9 * k, speed=0.2, phase=4.7 * k) for k in range(3))
 
 def traffic_of(*movers, kind="velocities", reach=math.inf):
     motions = Trajectories.of(replace(HALL, movers=movers), (1.0, 6.0))
-    predictor = GroundTruth(motions, Perception(kind=kind, range=reach), 60)
-    return Traffic(predictor, 0.2, HALL.bounds, 60)
+    return Traffic(GroundTruth(motions, Perception(kind=kind, range=reach)), 0.2, HALL.bounds, 60)
+
+
+def note(traffic, tick, robot=(1.0, 6.0)):
+    traffic._movers.at(tick, robot)
+    traffic.observe()
 
 
 def among(*movers, robot, **settings):
@@ -65,7 +69,7 @@ def test_the_box_holds_every_place_that_was_seen_and_no_more():
     motions = Trajectories.of(replace(HALL, movers=SHUTTLES), (1.0, 6.0))
     for tick in range(0, 300, 7):
         robot = (1.0 + 0.02 * tick, 6.0)
-        traffic.observe(tick, robot)
+        note(traffic, tick, robot)
         places = motions.positions(tick / 60)[0]
         seen += [p for p, r in zip(places, motions.radii, strict=True) if math.dist(p, robot) - r <= 5.0]
     expected = np.concatenate((np.min(seen, axis=0), np.max(seen, axis=0)))
@@ -75,11 +79,11 @@ def test_the_box_holds_every_place_that_was_seen_and_no_more():
 def test_a_box_has_grown_only_when_a_mover_was_seen_farther_out():
     traffic = traffic_of(shuttle(5.0), shuttle(8.0))
     assert not traffic.grown(0.1), "nothing was seen yet"
-    traffic.observe(0, (1.0, 6.0))
+    note(traffic, 0)
     assert traffic.grown(0.1)
-    traffic.zones(0, (1.0, 6.0), (15.0, 6.0), GRID)
+    traffic.zones((15.0, 6.0), GRID)
     assert not traffic.grown(0.1)
-    traffic.observe(30, (1.0, 6.0))
+    note(traffic, 30)
     assert traffic.grown(0.4)
     assert not traffic.grown(0.6)
 
@@ -96,8 +100,12 @@ def test_the_rate_is_that_of_movers_meeting_robots_put_down_at_random():
         share = np.clip(((x - a[0]) * (b - a)[0] + (y - a[1]) * (b - a)[1]) / ((b - a) @ (b - a)), 0, 1)
         swept = np.hypot(x - a[0] - share * (b - a)[0], y - a[1] - share * (b - a)[1]) < r + 0.2
         met += int((swept & (np.hypot(x - a[0], y - a[1]) >= r + 0.2)).sum())
-    assert traffic_of(*movers).rate(60, (1.0, 6.0)) == pytest.approx(met * side**2 / (16 * 12), rel=0.02)
-    assert traffic_of(*movers, kind="positions").rate(60, (1.0, 6.0)) == 0.0
+    rates = []
+    for kind in ("velocities", "positions"):
+        traffic = traffic_of(*movers, kind=kind)
+        note(traffic, 60)
+        rates.append(traffic.rate)
+    assert rates == [pytest.approx(met * side**2 / (16 * 12), rel=0.02), 0.0]
 
 
 def test_few_places_make_a_box_that_is_grown_and_many_one_as_seen():
@@ -110,9 +118,9 @@ def test_few_places_make_a_box_that_is_grown_and_many_one_as_seen():
     traffic = traffic_of(*SHUTTLES)
     boxes = []
     for tick in range(1200):
-        traffic.observe(tick, (1.0, 6.0))
+        note(traffic, tick)
         if tick in (0, 1199):
-            boxes.append([zone._box for zone in traffic.zones(tick, (1.0, 6.0), (15.0, 6.0), GRID)])
+            boxes.append([zone._box for zone in traffic.zones((15.0, 6.0), GRID)])
     assert traffic.samples == pytest.approx(11 + 11 * 1199 / (60 * MIXING))
     for (larger, seen), n in zip(boxes, (11, traffic.samples), strict=True):
         np.testing.assert_allclose(larger[2:] - seen[2:], (seen[2:] - seen[:2]) / (n + 1))
@@ -209,7 +217,7 @@ class Seen:
     """Stub of mover tracking with given tracks."""
 
     def __init__(self):
-        self.tick, self.sight, self.reach = 0, 50.0, 7.5
+        self.tick, self.sight, self.reach, self.hz = 0, 50.0, 7.5, 60
         self.tracker = SimpleNamespace(movers=lambda: self.now, found=99)
         self.see([])
 
@@ -225,22 +233,35 @@ class Seen:
 
 def traffic_seen(robot):
     tracking = Seen()
-    return TrackedTraffic(Tracked(tracking, LIDAR, 60), robot, 60), tracking
+    return TrackedTraffic(Tracked(tracking, LIDAR), robot, 60), tracking
+
+
+def look(watching, tick, pose=POSE, *waiting):
+    """Let traffic, or movers ahead, observe a control period."""
+    watching._movers.read(observed(tick, pose))
+    watching.observe(*waiting)
+
+
+def seen_from(exploration, pose):
+    """The exploration of a robot that has just observed where it is."""
+    tick = exploration.survey.tracking.tick
+    exploration._movers._movers.read(observed(tick, pose))
+    return exploration
 
 
 def ahead(robot, hits=None, **policy):
     tracking = Seen()
     found = np.empty((0, 3)) if hits is None else hits
     survey = SimpleNamespace(map=SimpleNamespace(trust=7.5, discs=lambda: found))
-    predictor, settings = Tracked(tracking, LIDAR, 60), ReplanPolicy(**policy)
-    return MoversSeenAhead(predictor, survey, settings, robot, ACROSS.goal, robot.radius + 0.03, 60), tracking
+    predictor, settings = Tracked(tracking, LIDAR), ReplanPolicy(**policy)
+    return MoversSeenAhead(predictor, survey, settings, robot, ACROSS.goal, robot.radius + 0.03), tracking
 
 
 def busy(movers, tracking, speed):
     """Show it ten movers between the long walls, each on another place and going north."""
     for tick in range(1, 61):
         tracking.see([(3.0 + k, 3.0 + 6.0 * ((k + 0.1 * tick) % 1.0), 0.0, speed) for k in range(10)], tick=tick)
-        movers.observe(tick, POSE, False)
+        look(movers, tick, POSE, False)
 
 
 def straight(robot, y=6.0):
@@ -253,11 +274,11 @@ def straight(robot, y=6.0):
 def test_only_movers_that_the_last_scan_met_make_the_box(jackal):
     traffic, tracking = traffic_seen(jackal)
     tracking.see([(2.0, 3.0, 0.0, 1.0), (5.0, 4.0, 1.0, 0.0), (30.0, -9.0, 1.0, 0.0)], hidden=1)
-    traffic.observe(tracking.tick, POSE[:2])
+    look(traffic, tracking.tick)
     assert traffic.box.tolist() == [2.0, 3.0, 5.0, 4.0]
     assert traffic.samples == 2
     tracking.see([(7.0, 3.5, 1.0, 0.0)], tick=tracking.tick)  # no new scan
-    traffic.observe(tracking.tick, POSE[:2])
+    look(traffic, tracking.tick)
     assert traffic.box.tolist() == [2.0, 3.0, 5.0, 4.0]
 
 
@@ -269,14 +290,14 @@ def test_the_rate_counts_fast_movers_in_reach_on_the_ground_in_sight(jackal):
     expected = 2 * 2 * (0.4 + jackal.radius) * 1.8 / 50.0
     for tick in range(1, 60 * 30):
         tracking.see(rows, tick=tick)
-        traffic.observe(tick, POSE[:2])
+        look(traffic, tick)
         if tick == 6:  # a velocity that is wrong for a moment is no traffic
-            assert 0 < traffic.rate(0, POSE[:2]) < 0.1 * expected
-    assert traffic.rate(0, POSE[:2]) == pytest.approx(expected)
+            assert 0 < traffic.rate < 0.1 * expected
+    assert traffic.rate == pytest.approx(expected)
     for tick in range(tracking.tick + 1, tracking.tick + 1 + round(60 * FADING)):
         tracking.see([], tick=tick)
-        traffic.observe(tick, POSE[:2])
-    assert traffic.rate(0, POSE[:2]) == pytest.approx(expected * math.exp(-1), rel=1e-3)
+        look(traffic, tick)
+    assert traffic.rate == pytest.approx(expected * math.exp(-1), rel=1e-3)
 
 
 @settings(max_examples=25)
@@ -286,10 +307,10 @@ def test_without_tracks_nothing_changes(jackal, hits, x, y, yaw):
     movers, tracking = ahead(jackal, discs)
     for tick in range(1, 200, 40):
         tracking.see([], tick=tick)
-        movers.observe(tick, (x, y, yaw), False)
-        assert movers.trigger(tick, (x, y, yaw), straight(jackal), 0.0) == ""
-    assert not movers.heavy(200, (x, y, yaw))
-    assert movers.discs(200, (x, y, yaw)) == []
+        look(movers, tick, (x, y, yaw), False)
+        assert movers.trigger(straight(jackal), 0.0) == ""
+    assert not movers.heavy
+    assert movers.discs() == []
     assert movers.without_trails(discs, (x, y, yaw)) is discs
 
 
@@ -301,16 +322,16 @@ def test_a_mover_on_its_way_onto_the_route_makes_a_new_one_due(jackal):
         ((8.0, 7.5), ""),
     ):  # here, too late, too far
         tracking.see([(*start, 0.0, -1.0)])
-        movers.observe(tracking.tick, POSE, False)
-        assert movers.trigger(tracking.tick, POSE, straight(jackal), 0.0) == trigger, start
+        look(movers, tracking.tick, POSE, False)
+        assert movers.trigger(straight(jackal), 0.0) == trigger, start
 
 
 def test_a_long_wait_triggers_a_replan(jackal):
     movers, _ = ahead(jackal, max_wait=2.0)
     due = []
     for tick in range(200):
-        movers.observe(tick, POSE, tick >= 10)
-        due.append(movers.trigger(tick, POSE, straight(jackal), 0.0))
+        look(movers, tick, POSE, tick >= 10)
+        due.append(movers.trigger(straight(jackal), 0.0))
     assert due.index(Trigger.WAITED) == pytest.approx(10 + 2 * 60, abs=1)
     assert due.count(Trigger.WAITED) == 1
 
@@ -320,7 +341,7 @@ def test_a_route_through_busy_ground_is_due_for_a_new_one_and_one_along_the_wall
         movers, tracking = ahead(jackal, max_traffic=0.07)
         busy(movers, tracking, speed)
         tracking.see([])  # where they are is no matter, but where they have been
-        assert movers.trigger(61, POSE, straight(jackal, y), 0.0) == trigger, (speed, y)
+        assert movers.trigger(straight(jackal, y), 0.0) == trigger, (speed, y)
 
 
 def test_the_largest_zone_leaves_a_lane_along_the_walls(jackal):
@@ -329,7 +350,7 @@ def test_the_largest_zone_leaves_a_lane_along_the_walls(jackal):
     busy(movers, tracking, 1.8)
     assert movers.bounds((0.0, 0.0, 16.0, 12.0)) == (0.0, 0.0, 16.0, 12.0)
     grid = rasterise(HALL, 0.05, jackal.radius + 0.03)
-    zones = movers.zones(60, POSE, grid)
+    zones = movers.zones(grid)
     assert len(zones) == 3
     free = grid.free & ~zones[0].blocked
     lane = free[grid.cell_at(8.0, 0.0)[0] :, grid.cell_at(8.0, 0.0)[1]]
@@ -342,7 +363,7 @@ def test_the_largest_zone_leaves_a_lane_along_the_walls(jackal):
 def test_only_far_hits_where_movers_roam_are_left_out(jackal, hits):
     movers, tracking = ahead(jackal)
     tracking.see([(4.0, 3.0, 0.0, 1.0), (12.0, 9.0, 0.0, 1.0)])
-    movers.observe(tracking.tick, POSE, False)
+    look(movers, tracking.tick, POSE, False)
     discs = np.array([(*hit, 0.02) for hit in hits])
     kept = [hit for hit in hits if not (4 < hit[0] < 12 and 3 < hit[1] < 9 and math.dist(hit, POSE[:2]) > 7.5)]
     assert movers.without_trails(discs, POSE)[:, :2].tolist() == [list(hit) for hit in kept]
@@ -359,20 +380,20 @@ def test_plans_lead_round_busy_ground_and_off_movers(jackal, planner):
     exploration = compose(unknown(jackal, planner))[1]
     movers = exploration._movers
     tracking = exploration.survey.tracking = Seen()
-    movers._predictor.tracking = tracking
-    _, plan, avoided = exploration._plan_around(0, POSE, "obstructed")
+    movers._movers.tracking = tracking
+    _, plan, avoided = seen_from(exploration, POSE)._plan_around(POSE, "obstructed")
     assert (avoided, plan.cost) == ([], pytest.approx(14.0, abs=0.1))
     tracking.see([(3.0, 6.0, 0.0, 0.0)])
-    _, plan, avoided = exploration._plan_around(tracking.tick, POSE, "obstructed")
+    _, plan, avoided = seen_from(exploration, POSE)._plan_around(POSE, "obstructed")
     assert len(avoided) > 0
     assert 14.1 < plan.cost < 16.0
     busy(movers, tracking, 1.8)
-    _, plan, _ = exploration._plan_around(60, POSE, "obstructed")
+    _, plan, _ = seen_from(exploration, POSE)._plan_around(POSE, "obstructed")
     assert plan.cost > 18.0
     for pose in (POSE, (5.0, 9.0, 0.0)):  # beside it, and in it: straight out
-        grid, plan, avoided = exploration._plan_around(60, pose, "obstructed")
+        grid, plan, avoided = seen_from(exploration, pose)._plan_around(pose, "obstructed")
         if planner != "tangent":  # which knows no cells, and what bounds the ground alone
-            assert any(not zone.blocked[tuple(plan.cells.T)].any() for zone in movers.zones(60, pose, grid))
+            assert any(not zone.blocked[tuple(plan.cells.T)].any() for zone in movers.zones(grid))
         route, _ = exploration._route(pose, grid, plan, avoided)
         arcs = np.arange(0.0, route.length, 0.05)
         points = np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
@@ -415,22 +436,22 @@ class AlwaysObstructed(MoversAhead):
 @given(way=st.lists(st.floats(1.0, 15.0), min_size=1, max_size=60))
 def test_movers_make_at_most_three_replans_for_a_metre_of_progress(way):
     """The robot jumps to and fro on a line; only ground nearer to its goal than ever is progress."""
-    movers = AlwaysObstructed(None, ReplanPolicy(), (15.0, 6.0), GRID, 60, None)
+    movers = AlwaysObstructed(PerceivedMovers(Perception()), ReplanPolicy(), (15.0, 6.0), GRID, None)
     reached, replanned = 0.0, []
     for tick, x in enumerate(way):
         pose = (x, 6.0, 0.0)
         reached = max(reached, x)
-        movers.observe(tick, pose, False)
-        if movers.trigger(tick, pose, None, 0.0):
+        look(movers, tick, pose, False)
+        if movers.trigger(None, 0.0):
             replanned.append(reached)
     assert all(after - before >= 1.0 - 1e-9 for before, after in zip(replanned, replanned[3:], strict=False))
     assert len(replanned) >= min(3, len(way))
 
 
 def test_a_robot_that_has_waited_replans_again():
-    movers = AlwaysObstructed(None, ReplanPolicy(), (15.0, 6.0), GRID, 60, None)
+    movers = AlwaysObstructed(PerceivedMovers(Perception()), ReplanPolicy(), (15.0, 6.0), GRID, None)
     due = []
     for tick in range(360):
-        movers.observe(tick, POSE, True)
-        due.append(movers.trigger(tick, POSE, None, 0.0))
+        look(movers, tick, POSE, True)
+        due.append(movers.trigger(None, 0.0))
     assert [each for each in due if each] == [Trigger.OBSTRUCTED] * 3 + [Trigger.WAITED] * 2

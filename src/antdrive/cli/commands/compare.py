@@ -76,7 +76,6 @@ def compare(
     """
     from antdrive.base.components import ComponentError
     from antdrive.sim.pipeline import run
-    from antdrive.sim.written import Written
 
     if campaigns := campaign_folders(worlds, context, query):
         compare_campaigns(campaigns, planner or (), query, json)
@@ -113,7 +112,7 @@ def compare(
             if isinstance(result, ComponentError):
                 print_traceback(result)
                 return result, None
-            command = Written.of(scenario).command() or ""
+            command = scenario.written.command() or ""
             write_run(result, part, command, figures=figures and case == cases[0])
             return result, str(part)
 

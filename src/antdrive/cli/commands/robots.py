@@ -57,14 +57,13 @@ def show_robot(
 ) -> None:
     """Describe a robot and draw it from above."""
     from antdrive.robots import load_robot, robot_to_dict
-    from antdrive.robots.card import facts_of
 
     spec = load_robot(robot)
     if out is not None:
         from antdrive.views.figures.robot_figure import robot_figure
 
         robot_figure(spec, out)
-    said = {"robot": spec.name, **facts_of(spec), "radius": f"{spec.radius:.4g} m around the axle"}
+    said = {"robot": spec.name, **spec.facts, "radius": f"{spec.radius:.4g} m around the axle"}
     lines = [f"{key:14} {value}" for key, value in said.items()]
     lines += [] if out is None else file_lines({"figure": out})
     show(json, {**robot_to_dict(spec), "radius": spec.radius}, lines)

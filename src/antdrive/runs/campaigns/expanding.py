@@ -29,8 +29,8 @@ from antdrive.runs.campaigns.resolving import (
 from antdrive.sim.forms import name_and_options, scenario_fields
 from antdrive.sim.idle_settings import idle_notes
 from antdrive.sim.log.record import canonical_hash
-from antdrive.sim.scenario import Scenario, key_of
-from antdrive.sim.written import Written, placed, unchosen, with_controller
+from antdrive.sim.scenario import Scenario, key_of, unchosen
+from antdrive.sim.written import Written, placed, with_controller
 from antdrive.worlds import Task
 from antdrive.worlds.formats.map_server import OF_SHADE
 

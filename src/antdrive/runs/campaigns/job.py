@@ -14,9 +14,9 @@ from antdrive.planners import PLANNERS, load_planner
 from antdrive.robots import RobotSpec
 from antdrive.runs.margins.choice import Calibration, with_chosen_margin, with_margin_of
 from antdrive.sim.forms import columns_of
-from antdrive.sim.scenario import Scenario
+from antdrive.sim.scenario import Scenario, unchosen
 from antdrive.sim.settings import SETTINGS
-from antdrive.sim.written import Written, unchosen
+from antdrive.sim.written import Written
 from antdrive.worlds import Task
 
 
@@ -115,7 +115,7 @@ class SweepCase:
             )
         planner = load_planner(self.planner.source, **self.planner.given)
         words = dataclasses.replace(self.written, settings=self.settings, seed=seed)
-        return words.scenario(choose=choose, task=self.place.task, planner=planner, robot=self.robot.robot)
+        return Scenario.read(words, choose=choose, task=self.place.task, planner=planner, robot=self.robot.robot)
 
     @functools.cached_property
     def resolved(self) -> Resolved:

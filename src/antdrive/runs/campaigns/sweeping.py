@@ -29,7 +29,7 @@ from antdrive.runs.margins.choice import Calibration, choose_margin
 from antdrive.runs.margins.loss import calibration_key
 from antdrive.runs.pool import Done, Pool, cores
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.written import unchosen
+from antdrive.sim.scenario import unchosen
 from antdrive.worlds import save_task
 
 OUTCOMES = (*(one.key for one in Outcome), *FAULTS, CRASHED, TOO_SLOW)

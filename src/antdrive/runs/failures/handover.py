@@ -70,7 +70,7 @@ def write_suite(path: Path, failures: Sequence[Attempt], notes: Sequence[str] = 
 
 def _written(scenario: Scenario, world: str, folder: Path, robots: dict[str, RobotSpec]) -> Written:
     """Return a scenario in words for a suite in a folder, with its world in a file."""
-    words = Written.of(scenario).moved(lambda name: relative(Path.cwd() / name, folder.absolute()))
+    words = scenario.written.moved(lambda name: relative(Path.cwd() / name, folder.absolute()))
     pinned = {key: getattr(scenario, key) for key in PINNED}
     settings = {**pinned, **words.settings, "margin": scenario.planned_margin}
     robot = _robot(scenario.robot, folder, robots)

@@ -15,6 +15,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
 from antdrive.runs.failures.candidates import CandidateRunner
 from antdrive.runs.failures.ddmin import one_minimal
+from antdrive.sim.idle_settings import idle_settings
 from antdrive.sim.log.metrics import nearest_on_route, nearest_segments
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.scenario import Scenario
@@ -173,7 +174,7 @@ def _needed(
 
 def _is_random(scenario: Scenario) -> bool:
     """Return whether a run depends on its seed."""
-    return "seed" not in scenario.idle_settings({"seed"})
+    return "seed" not in idle_settings(scenario, {"seed"})
 
 
 def _with_seeds(candidates: Iterable[Scenario | None]) -> Iterator[Scenario | None]:

@@ -5,14 +5,11 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from antdrive.base.checks import suggest
 from antdrive.base.errors import input_error
 from antdrive.runs.suites.suite import SUFFIX, SuiteCase, load_suite
-
-if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
+from antdrive.sim.scenario import Scenario
 
 
 def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] | None = None) -> Scenario:
@@ -29,7 +26,7 @@ def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] | None =
     """
     from antdrive.runs.margins.choice import with_chosen_margin
 
-    return case.written.scenario(case.suite.parent, case.error, choose=choose or with_chosen_margin)
+    return Scenario.read(case.written, case.suite.parent, case.error, choose=choose or with_chosen_margin)
 
 
 def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:

@@ -37,26 +37,24 @@ STANDING_STEP = 1.0  # time step of the check whether a prediction starts to mov
 
 
 def covered_discs(
-    predictor: PerceivedMovers,
-    tick: int,
+    movers: PerceivedMovers,
     ends: Floats,
     duration: float,
     grid: Grid,
     only: npt.NDArray[np.int64] | None = None,
     wider: float = 0.0,
 ) -> list[Disc]:
-    """Return the discs that movers cover within `duration` [s] of a tick.
+    """Return the discs that movers cover within `duration` [s].
 
     `only` selects movers by number; `wider` [m] is added to their radii.
 
     Discs shrink where their inflation would cover one of the `ends` (N, 2) [m], so movers close neither end. The
     first end is the robot's position.
     """
-    x, y = ends[0].tolist()
     times = np.linspace(0.0, duration, 1 + math.ceil(duration / STEP))
-    positions, radii = predictor.predict(tick, (x, y), times)
+    positions, radii = movers.predict(times), movers.near.radii
     if only is not None:
-        wanted = np.isin(predictor.within_range(tick, (x, y)), only)
+        wanted = np.isin(movers.near.numbers, only)
         positions, radii = positions[:, wanted], radii[wanted]
     room = np.hypot(*np.moveaxis(positions[:, :, None] - ends, -1, 0)).min(axis=-1) - grid.inflate - grid.cell
     radius = np.minimum(radii + wider, room)
@@ -147,53 +145,49 @@ class Blockage:
         reason: which mover blocks the robot and where, once the robot's patience is over; else empty
     """
 
-    def __init__(
-        self, task: Task, grid: Grid, predictor: PerceivedMovers, hz: int, policy: ReplanPolicy, clearance: float
-    ) -> None:
+    def __init__(self, task: Task, grid: Grid, movers: PerceivedMovers, policy: ReplanPolicy, clearance: float) -> None:
         self.failed_searches, self.reason = Search(), ""
         self._gaps: dict[int, Gap] = {}  # by mover
         self._all = np.empty((0, 2))  # positions of all movers when the last gap was noted
-        self._task, self._grid, self._predictor, self._hz = task, grid, predictor, hz
+        self._task, self._grid, self._movers = task, grid, movers
         self._policy, self._clearance = policy, clearance
 
-    def pause(self, tick: int, position: Point) -> bool:
+    def pause(self) -> bool:
         """Return whether a search now would repeat the last one."""
         if not self.failed_searches.failures:
             return False
-        if not self._still_there(tick, position):
+        if not self._still_there():
             self.route_found()
             return False
-        return tick / self._hz < self.failed_searches.due
+        return self._movers.t < self.failed_searches.due
 
     def route_found(self) -> None:
         """Forget failed searches: a route exists, or may open soon."""
         self.failed_searches = Search()
 
-    def failed(self, tick: int, pose: Pose) -> None:
+    def failed(self, pose: Pose) -> None:
         """Count a search from a pose [m, m, rad] that found no route."""
-        now, position = tick / self._hz, pose[:2]
-        standing = self.standing(tick, position)
+        now, standing = self._movers.t, self.standing()
         last, interval, patience = self.failed_searches, self._policy.min_interval, self._policy.patience
-        if last.failures and not self._closed(tick, pose, np.intersect1d(standing, last.movers)):
+        if last.failures and not self._closed(pose, np.intersect1d(standing, last.movers)):
             last = Search()
         if not last.failures:
-            if not self._closed(tick, pose, standing):
+            if not self._closed(pose, standing):
                 self.route_found()
                 return
-            places = self._predictor.perceived(tick, position)[1][standing]
-            last = Search(since=now, movers=standing, places=places)
+            last = Search(since=now, movers=standing, places=self._movers.places[standing])
         due = min(now + interval * 2.0 ** min(last.failures, 30), max(last.since + patience, now + interval))
         self.failed_searches = last._replace(failures=last.failures + 1, due=due)
         if now - last.since >= patience:
-            self.reason = self._sentence(tick, pose)
+            self.reason = self._sentence(pose)
 
-    def may_pass(self, tick: int, position: Point) -> bool:
+    def may_pass(self) -> bool:
         """Allow passing noted movers at the safety margin after a failure, if all movers have stood still since."""
         if not self.failed_searches.failures:
             return False
-        noted = [m for m, gap in self._noted(tick, position).items() if not (gap.passed or gap.refused)]
-        perceived, positions = self._predictor.perceived(tick, position)
-        if not noted or not np.isin(perceived, self.standing(tick, position)).all():
+        noted = [m for m, gap in self._noted().items() if not (gap.passed or gap.refused)]
+        perceived, positions = self._movers.near.numbers, self._movers.places
+        if not noted or not np.isin(perceived, self.standing()).all():
             return False
         if len(positions) != len(self._all):  # a new mover is perceived
             return False
@@ -202,89 +196,86 @@ class Blockage:
         self._gaps |= {m: self._gaps[m]._replace(passed=True) for m in noted}
         return True
 
-    def note_gaps(self, tick: int, position: Point, tracked: TrackedPath, arc: float) -> None:
+    def note_gaps(self, tracked: TrackedPath, arc: float) -> None:
         """Note the standing movers that the route ahead passes too closely for avoidance; noted ones need more each time."""
-        standing = self.standing(tick, position)
+        standing, near = self.standing(), self._movers.near
         if self._clearance <= self._grid.inflate or not len(standing):
             return
         ahead = np.arange(arc, min(arc + GAP_RANGE, tracked.length), GAP_STEP)
-        points, positions = points_at(tracked, ahead), self._predictor.perceived(tick, position)[1]
-        noted = self._noted(tick, position)
+        points, positions = points_at(tracked, ahead), self._movers.places
+        noted = self._noted()
         for m in standing.tolist():
-            gap = np.hypot(*(points - positions[m]).T).min(initial=np.inf) - self._predictor.radius_of(m)
+            gap = np.hypot(*(points - positions[m]).T).min(initial=np.inf) - near.radii[near.numbers == m][0]
             last = noted.get(m, Gap((math.nan, math.nan), self._clearance))
             if gap < last.width + GAP_SLACK:
                 at, width = (float(positions[m, 0]), float(positions[m, 1])), max(last.width, gap + GAP_SLACK)
                 self._gaps[m] = Gap(at, width, refused=last.passed or last.refused)
                 self._all = positions
 
-    def _noted(self, tick: int, position: Point) -> dict[int, Gap]:
+    def _noted(self) -> dict[int, Gap]:
         """Return the gaps beside noted movers that stand where they stood; forget the others."""
-        positions = self._predictor.perceived(tick, position)[1]
+        positions = self._movers.places
         self._gaps = {m: gap for m, gap in self._gaps.items() if np.hypot(*(positions[m] - gap.at)) <= STILL}
         return self._gaps
 
-    def discs(self, tick: int, ends: Floats, only: npt.NDArray[np.int64] | None = None) -> list[Disc]:
+    def discs(self, ends: Floats, only: npt.NDArray[np.int64] | None = None) -> list[Disc]:
         """Return the noted movers as discs, enlarged so that plans keep the clearance of avoidance."""
-        noted = self._noted(tick, (float(ends[0, 0]), float(ends[0, 1])))
         discs: list[Disc] = []
-        for m, gap in sorted(noted.items()):
+        for m, gap in sorted(self._noted().items()):
             if not gap.passed and (only is None or m in only):
                 wider = gap.width - self._grid.inflate
-                discs += covered_discs(self._predictor, tick, ends, 0.0, self._grid, np.array([m]), wider)
+                discs += covered_discs(self._movers, ends, 0.0, self._grid, np.array([m]), wider)
         return discs
 
-    def clearance_reduction(self, tick: int, position: Point) -> Floats:
+    def clearance_reduction(self) -> Floats:
         """Return how much closer than usual the robot may pass each perceived mover (P,) [m]."""
-        perceived = self._predictor.within_range(tick, position)
+        perceived = self._movers.near.numbers
         if not any(gap.passed for gap in self._gaps.values()):
             return np.zeros(len(perceived))
-        passed = [m for m, gap in self._noted(tick, position).items() if gap.passed]
+        passed = [m for m, gap in self._noted().items() if gap.passed]
         return np.where(np.isin(perceived, passed), self._clearance - self._grid.inflate, 0.0)
 
-    def standing(self, tick: int, position: Point) -> npt.NDArray[np.int64]:
+    def standing(self) -> npt.NDArray[np.int64]:
         """Return the perceived movers (S,) that are predicted to stand still for as long as the robot's patience."""
-        perceived = self._predictor.within_range(tick, position)
         patience = self._policy.patience
         ahead = np.linspace(0.0, patience, 1 + math.ceil(patience / STANDING_STEP))
-        positions, _ = self._predictor.predict(tick, position, ahead)
-        return np.asarray(perceived[np.hypot(*np.moveaxis(positions - positions[0], -1, 0)).max(axis=0) <= STILL])
+        positions = self._movers.predict(ahead)
+        still = np.hypot(*np.moveaxis(positions - positions[0], -1, 0)).max(axis=0) <= STILL
+        return np.asarray(self._movers.near.numbers[still])
 
-    def _still_there(self, tick: int, position: Point) -> bool:
+    def _still_there(self) -> bool:
         """Return whether all movers of the first failure are perceived where they stood."""
-        perceived, positions = self._predictor.perceived(tick, position)
         _, _, _, movers, places = self.failed_searches
-        near = np.hypot(*(positions[movers] - places).T) <= STILL
-        return bool(near.all() and np.isin(movers, perceived).all())
+        near = np.hypot(*(self._movers.places[movers] - places).T) <= STILL
+        return bool(near.all() and np.isin(movers, self._movers.near.numbers).all())
 
-    def _closed(self, tick: int, pose: Pose, movers: npt.NDArray[np.int64]) -> bool:
+    def _closed(self, pose: Pose, movers: npt.NDArray[np.int64]) -> bool:
         """Return whether these movers alone close every route that is open without them."""
-        return bool(len(movers)) and self._way(tick, pose, movers[:0]) and not self._way(tick, pose, movers)
+        return bool(len(movers)) and self._way(pose, movers[:0]) and not self._way(pose, movers)
 
-    def _way(self, tick: int, pose: Pose, movers: npt.NDArray[np.int64], narrow: bool = False) -> bool:
+    def _way(self, pose: Pose, movers: npt.NDArray[np.int64], narrow: bool = False) -> bool:
         """Return whether the grid has a route to the goal among these movers; `narrow` also counts refused gaps."""
         task = dataclasses.replace(self._task, start=pose)
         ends: Floats = np.array([pose[:2], task.goal])
-        discs = covered_discs(self._predictor, tick, ends, 0.0, self._grid, only=movers)
-        discs += [] if narrow else self.discs(tick, ends, only=movers)
+        discs = covered_discs(self._movers, ends, 0.0, self._grid, only=movers)
+        discs += [] if narrow else self.discs(ends, only=movers)
         world = with_obstacles(task, discs).world
         return reachable(Query.between(rasterise(world, self._grid.cell, self._grid.inflate), task))
 
-    def _sentence(self, tick: int, pose: Pose) -> str:
+    def _sentence(self, pose: Pose) -> str:
         """Name the nearest mover that alone blocks the robot, else the nearest of all, with its position and the time."""
-        _, positions = self._predictor.perceived(tick, pose[:2])
-        movers = self.failed_searches.movers
+        positions, movers = self._movers.places, self.failed_searches.movers
         order = movers[np.argsort(np.hypot(*(positions[movers] - pose[:2]).T), kind="stable")]
-        alone = (m for m in order.tolist() if self._way(tick, pose, order[order != m]))
+        alone = (m for m in order.tolist() if self._way(pose, order[order != m]))
         mover = next(alone, int(order[0]))
         at = format_position(self._task.frame, *positions[mover].tolist())
-        narrow = mover in self._noted(tick, pose[:2]) and self._way(tick, pose, order, narrow=True)
+        narrow = mover in self._noted() and self._way(pose, order, narrow=True)
         closes = (
             f"leaves a gap too narrow for local avoidance, which keeps the robot's centre {self._clearance:.3g} m from it"
             if narrow
             else "closes the way"
         )
         return (
-            f"{self._predictor.name_of(mover)} stands still at {at} and {closes}; "
+            f"{self._movers.name_of(mover)} stands still at {at} and {closes}; "
             f"no route to the goal for {self._policy.patience:g} s, in {self.failed_searches.failures} attempts"
         )

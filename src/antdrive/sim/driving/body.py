@@ -11,10 +11,11 @@ from antdrive.base import Pose
 from antdrive.robots import Twist
 from antdrive.robots.control.observation import NOBODY, Observation
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import SILENT, Ending, Note, Rows
-from antdrive.sim.driving.senses import MoverSense, Senses, SimulatedLidar
+from antdrive.sim.driving.parts import SILENT, Drive, Ending, Note
+from antdrive.sim.driving.senses import Senses
 from antdrive.sim.log.ending import arrived, control_periods, outcome_at
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import scans_logged
 
 if TYPE_CHECKING:
     from antdrive.sim.physics.engine import State
@@ -48,15 +49,13 @@ class Body:
         plant: Plant,
         senses: Senses,
         localiser: Exact,
-        lidar: SimulatedLidar | None = None,
-        movers: MoverSense | None = None,
         *,
         hz: int,  # control periods per second
         limit: float,  # time limit [s]
         task: Task | None = None,  # where the drive ends; None: nowhere
     ) -> None:
-        self._plant, self._senses, self._localiser, self._lidar, self._task = plant, senses, localiser, lidar, task
-        self._movers, self._periods, self._hz = movers, control_periods(limit, hz), hz
+        self._plant, self._senses, self._localiser, self._task = plant, senses, localiser, task
+        self._periods, self._hz = control_periods(limit, hz), hz
         self.estimates: list[Pose] = []
         self._command = Twist(0.0, 0.0)  # in force
         self._now: Observation | None = None
@@ -66,20 +65,20 @@ class Body:
     def observe(self) -> Observation:
         """Return what the robot observes in this control period."""
         if self._now is None:
-            state = self._plant.state
-            pose = self._localiser.update(*self._senses.read(state))
-            scan = self._lidar.scan(self.tick, state.pose) if self._lidar else None
-            twist, pending = Twist(state.speed, state.yaw_rate), tuple(self._senses.pending)
-            movers = self._movers.read(self.tick, pose[:2]) if self._movers else NOBODY
+            state, senses = self._plant.state, self._senses
+            pose = self._localiser.update(*senses.read(state))
+            scan = senses.lidar.scan(self.tick, state.pose) if senses.lidar else None
+            twist, pending = Twist(state.speed, state.yaw_rate), tuple(senses.pending)
+            movers = senses.movers.read(self.tick, pose[:2]) if senses.movers else NOBODY
             self._now = Observation(self.tick, self.tick / self._hz, pose, twist, self._command, pending, scan, movers)
         return self._now
 
     def step(self, command: Twist | None, note: Note = SILENT) -> None:
         """Drive for one control period; without a command, or at the goal, the drive ends where the robot stands."""
-        now = self.observe()
+        now = self._now or self.observe()
         believed = self._localiser.pose = note.pose or now.pose
         self.estimates.append(believed)
-        if self._arrived(believed, now.twist) or (command is None and note.ending is None):
+        if (command is None and note.ending is None) or self._arrived(believed, now.twist):
             self.ended = self._judged(believed)
             return
         if command is None:
@@ -92,12 +91,13 @@ class Body:
             self.tick += 1
             self.ended = self._timed_out()
 
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+    def logged(self, log: Drive, per_tick: int) -> dict[str, Any]:
         """Return the scans, and for a robot with noise the estimates and the motor targets.
 
         The error of an estimate stays constant within a control period.
         """
-        scans = self._lidar.logged(log, per_tick) if self._lidar else {}
+        lidar = self._senses.lidar
+        scans = scans_logged(lidar.taken, per_tick, len(log.t)) if lidar else {}
         if not self._senses.noisy:
             return scans
         errors = [

@@ -1,8 +1,8 @@
-"""The drive loop, and drives along one path."""
+"""Drives along one path."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from antdrive.robots import PurePursuit, TrackedPath
 from antdrive.robots.control.observation import Briefing
@@ -10,29 +10,19 @@ from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.driver import Driver, full_turn
 from antdrive.sim.driving.guide import Follow, Guide, Rule
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import Ending
-from antdrive.sim.driving.perceived_movers import Given
-from antdrive.sim.driving.plants import Bullet, Drive
+from antdrive.sim.driving.parts import Drive, Ending
+from antdrive.sim.driving.perceived_movers import PerceivedMovers
+from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.driving.rules import Pursuit
-from antdrive.sim.driving.senses import MoverSense, Senses
+from antdrive.sim.driving.senses import Senses
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Task
 
-#: Progress callback, called with the completed fraction of the route.
-Progress = Callable[[float], None]
 
-
-def ignore_progress(fraction: float) -> None:
-    """Ignore the progress of a drive."""
-
-
-def drive(body: Body, driver: Driver, progress: Progress = ignore_progress) -> Ending:
+def drive(body: Body, driver: Driver) -> Ending:
     """Drive until the driver gives up or has arrived, the robot touches something, or the time limit passes."""
     while body.ended is None:
-        now = body.observe()
-        body.step(*driver.act(now))
-        if now.tick % driver.progress_periods == 0:
-            progress(driver.fraction)
+        body.step(*driver.act(body.observe()))
     return driver.with_reason(body.ended, body.tick)
 
 
@@ -47,16 +37,14 @@ def follow(
     senses: Senses | None = None,
     localiser: Exact | None = None,
     rules: Sequence[Rule] = (),
-    movers: tuple[MoverSense, Given] | None = None,
-    progress: Progress = ignore_progress,
+    movers: PerceivedMovers | None = None,
 ) -> Drive:
     """Drive along a path from the start of a task, for at most `limit` [s]; `rules` apply after pursuit."""
     pursuit = Pursuit(controller, full_turn(engine.robot, control_hz))
-    sense, given = movers or (None, None)
     known = Briefing(engine.robot, task.start, task.goal, task.goal_tolerance, control_hz, task.world)
-    driver = Driver(known, Guide(), (pursuit, *rules), given=given)
+    driver = Driver(known, Guide(), (pursuit, *rules), movers=movers)
     driver.way = Follow(path)
     plant = Bullet(engine, task.start, control_hz)
     localiser = localiser or Exact(task.start, 1 / control_hz)
-    body = Body(plant, senses or Senses(), localiser, movers=sense, hz=control_hz, limit=limit, task=task)
-    return plant.finish(drive(body, driver, progress))
+    body = Body(plant, senses or Senses(), localiser, hz=control_hz, limit=limit, task=task)
+    return plant.finish(drive(body, driver))

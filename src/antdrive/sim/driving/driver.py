@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from antdrive.base import Pose
@@ -11,14 +11,22 @@ from antdrive.robots import LIMITERS, PursuitState, RobotSpec, Twist
 from antdrive.robots.control.observation import Briefing, Observation
 from antdrive.robots.noise import moved_by
 from antdrive.sim.driving.guide import Follow, GiveUp, Guide, Moment, Rule, Wait
-from antdrive.sim.driving.parts import EXPLORING_LIMITERS, Ending, Note, Rows, Step, StuckClock
-from antdrive.sim.driving.perceived_movers import Given
+from antdrive.sim.driving.parts import EXPLORING_LIMITERS, Drive, Ending, Note, Step, StuckClock
+from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.rules import WAITING_SPEED
 from antdrive.sim.driving.survey import Scans
 from antdrive.sim.log.ending import STUCK_TIME, arrived, stopped
 from antdrive.sim.log.outcome import Outcome
 
 PROGRESS_HZ = 10  # reports of progress per simulated second
+
+
+#: Progress callback, called with the completed fraction of the route.
+Progress = Callable[[float], None]
+
+
+def ignore_progress(fraction: float) -> None:
+    """Ignore the progress of a drive."""
 
 
 class Driver:
@@ -31,7 +39,7 @@ class Driver:
         scans: reads the lidar; None: unused
         way: the current way
         step: the current step
-        progress_periods: control periods between two reports of progress
+        progress: called with the completed fraction of the route
     """
 
     way: Follow
@@ -42,48 +50,47 @@ class Driver:
         guide: Guide,
         rules: Sequence[Rule],
         scans: Scans | None = None,
-        given: Given | None = None,
+        movers: PerceivedMovers | None = None,
     ) -> None:
         self.briefing, self.guide, self.rules, self.scans, self.step = briefing, guide, tuple(rules), scans, Step()
-        self._given, self._clock, self._hz = given, StuckClock(), briefing.hz
+        self._movers, self._clock, self._hz = movers, StuckClock(), briefing.hz
         self._patience = round(STUCK_TIME * briefing.hz)
         self._full_turn = full_turn(briefing.robot, briefing.hz)
-        self.progress_periods = briefing.hz // PROGRESS_HZ or 1
-
-    @property
-    def fraction(self) -> float:
-        """Completed fraction of the route."""
-        return self.step.pursuit.arc / self.way.path.length
+        self._progress_periods = briefing.hz // PROGRESS_HZ or 1
+        self.progress: Progress = ignore_progress
 
     def act(self, now: Observation) -> tuple[Twist | None, Note]:
         """Return the command of one control period, None to stay where the robot stands, and a note on it."""
         guide, known, before, believed = self.guide, self.briefing, self.step, now.pose
         if now.scan is not None and self.scans is not None:
             believed = self.scans.read(now.tick, believed, now.scan)
-        if self._given is not None:
-            self._given.read(now.movers)
-        silent = Note(believed)
         if now.tick and arrived(believed, now.twist, before.command, known.goal, known.tolerance):
-            return None, silent
+            return None, Note(believed)
         pose = moved_by(believed, now.pending, 1 / self._hz)
+        seen = now if pose is now.pose else now._replace(pose=pose)
+        if self._movers is not None:
+            self._movers.read(seen)
         waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
-        seen = now._replace(pose=pose)
         moment = Moment(seen, self.way, before, self._clock, waiting)
-        answer = guide.path(moment)
-        if isinstance(answer, GiveUp):
-            return None, silent._replace(ending=answer.ending)
-        self._follow(answer)
-        moment, step = Moment(seen, self.way, self.step, self._clock), self.step
+        way = guide.path(moment)
+        if isinstance(way, GiveUp):
+            return None, Note(believed, ending=way.ending)
+        if way is not self.way:
+            self._follow(way)
+            moment = Moment(seen, way, self.step, self._clock)
+        step = self.step
         for rule in self.rules:
             step = rule.apply(moment, step)
         self.step = step
         if self._at_end_of_route(pose, now.twist, before.command):
-            answer = guide.path(moment, at_end=True)
-            if isinstance(answer, GiveUp):
-                return None, silent._replace(ending=answer.ending)
-            self._follow(answer)
-        turns = isinstance(self.way, Wait) and self.way.scan_turn is not None
+            way = guide.path(moment, at_end=True)
+            if isinstance(way, GiveUp):
+                return None, Note(believed, ending=way.ending)
+            self._follow(way)
+        turns = isinstance(way, Wait) and way.scan_turn is not None
         self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or turns)
+        if now.tick % self._progress_periods == 0:
+            self.progress(self.step.pursuit.arc / self.way.path.length)
         return step.command, Note(believed, step.pursuit.limiter, self._gives_up())
 
     @property
@@ -91,7 +98,7 @@ class Driver:
         """Names of the rules that limit the speed."""
         return EXPLORING_LIMITERS if self.briefing.map is None else LIMITERS
 
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+    def logged(self, log: Drive, per_tick: int) -> dict[str, Any]:
         """Return what guide and mover tracking add to a log."""
         tracking = self.scans.tracking if self.scans else None
         return self.guide.logged(log, per_tick) | (tracking.logged(log, per_tick) if tracking else {})

@@ -18,14 +18,14 @@ from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.kernel_cache import clock
 from antdrive.base.records import unchecked_copy
 from antdrive.planners import PlanResult, PlanStatus, Query, smooth
-from antdrive.robots import TrackedPath, Twist, outline_of
+from antdrive.robots import TrackedPath, outline_of
 from antdrive.robots.control.pursuit import obstacles_around
 from antdrive.robots.default_margin import mapless_margins
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blockage import with_obstacles
-from antdrive.sim.driving.guide import Follow, RouteGuide, Wait
+from antdrive.sim.driving.guide import Follow, Moment, RouteGuide, Wait
 from antdrive.sim.driving.movers_ahead import MoversSeenAhead
-from antdrive.sim.driving.parts import Rows, table_logged
+from antdrive.sim.driving.parts import Drive, table_logged
 from antdrive.sim.driving.recovery import TRAIL, Recovery
 from antdrive.sim.driving.route_planner import RoutePlanner, bounds_of
 from antdrive.sim.driving.survey import PATIENCE, ROUTE_CHECK_STEP, RoutePoints, Survey
@@ -56,6 +56,7 @@ class Exploration(RouteGuide):
 
     Attributes:
         lost: whether the map has no path; the robot then stops
+        recovery: what the robot does where it stalls
     """
 
     def __init__(
@@ -72,7 +73,7 @@ class Exploration(RouteGuide):
         self._checked = self._indexed = 0
         self._planned_at = -math.inf
         self.lost, self._failures, self._gave_up_at = False, 0, -math.inf
-        self._recovery = Recovery(survey, planner.robot, planner.task.start, planner.hz)
+        self.recovery = Recovery(survey, planner.robot, planner.task.start, planner.hz)
         self._tick = 0
         self._seen: list[tuple[int, Floats]] = []
         self._known_as: tuple[tuple[Any, ...], Task] = (), planner.task
@@ -80,7 +81,7 @@ class Exploration(RouteGuide):
     @property
     def _may_wait(self) -> bool:  # type: ignore[override]
         """Whether the robot may stay in place: it has no path and tries again, or it makes a scan turn."""
-        return self.lost or self._recovery.scan_turn is not None
+        return self.lost or self.recovery.scan_turn is not None
 
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start on the map of the first scan. Later plans do not depend on it."""
@@ -163,26 +164,26 @@ class Exploration(RouteGuide):
         robot = self._robot
         return rasterise(task.world, self._routes.cell, robot.radius + margin, outline_of(robot.footprint, margin))
 
-    def _plan_around(self, tick: int, pose: Pose, trigger: str) -> tuple[Grid, PlanResult, list[Disc]]:
+    def _plan_around(self, pose: Pose, trigger: str) -> tuple[Grid, PlanResult, list[Disc]]:
         """Plan around tracked movers from a pose; return the grid, the plan and the discs that it avoids."""
         movers = self._movers
         if movers is None:
             return (*self.plan(pose), [])
-        if movers.heavy(tick, pose):
+        if movers.heavy:
             task = self._known(pose, movers.bounds(self._bounds(GROWTH[0], pose)))
             grid = self._grid(task, self._routes.margin)
-            zones, soon = movers.zones(tick, pose, grid), movers.discs(tick, pose)
-            around = movers.plan_around_zones(pose, zones, soon, functools.partial(self._routes.around, task, grid))
+            zones, soon = movers.zones(grid), movers.discs()
+            around = movers.plan_around_zones(zones, soon, functools.partial(self._routes.around, task, grid))
             if around is not None:
                 return (grid, *around)
-        discs = movers.discs(tick, pose)
+        discs = movers.discs()
         if discs:
             grid, answer = self.plan(pose, discs)
             # Only for the footprint, whose detours have turns on the spot. For the disc the rule saves time on average, but
             # some waits take twice the detour, and robots stay near movers that turn back for longer.
             if answer.solved and grid.turns:
                 free, speed = self.plan(pose), self._robot.max_speed
-                if movers.waiting_is_quicker(tick, pose, trigger, speed, answer.cost, free[1].cost):
+                if movers.waiting_is_quicker(trigger, speed, answer.cost, free[1].cost):
                     return (*free, [])
             if answer.solved:
                 return grid, answer, discs
@@ -254,7 +255,7 @@ class Exploration(RouteGuide):
     # ---- the driver's queries
 
     def _way(self, path: TrackedPath) -> Follow:
-        return Wait(path, scan_turn=self._recovery.scan_turn) if self._may_wait else Follow(path)
+        return Wait(path, scan_turn=self.recovery.scan_turn) if self._may_wait else Follow(path)
 
     def _refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
         if self._indexed == self.survey.whole:
@@ -265,29 +266,29 @@ class Exploration(RouteGuide):
         discs = self.survey.map.discs((x - near, y - near, x + near, y + near))
         return path.with_obstacles(obstacles_around(np.array((x, y)), discs, path.obstacles.bounds))
 
-    def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
+    def trigger(self, now: Moment) -> str:
         """Return the trigger of a new route; empty if none is due."""
-        now = tick / self._hz
+        t, pose, tracked, arc = now.observed.t, now.pose, now.way.path, now.before.pursuit.arc
         if self._movers is not None:
-            self._movers.observe(tick, pose, waiting)
-        recovery = self._recovery
+            self._movers.observe(now.waiting)
+        recovery = self.recovery
         if recovery.scan_turn is not None:
             return Trigger.SCAN_TURN if recovery.scan_turn.done else ""
         if self.lost:
-            return Trigger.LOST if now - self._planned_at >= INTERVAL else ""
+            return Trigger.LOST if t - self._planned_at >= INTERVAL else ""
         turns = tracked.route.turns is not None
-        recovery.note_progress(now, pose, waiting=waiting, backwards=tracked.backwards, turns=turns)
+        recovery.note_progress(t, pose, waiting=now.waiting, backwards=tracked.backwards, turns=turns)
         if tracked.route is recovery.route:
-            over = tracked.length - arc < 2 * TRAIL or recovery.stalled(now)
+            over = tracked.length - arc < 2 * TRAIL or recovery.stalled(t)
             return (Trigger.BACKED_OFF if tracked.backwards else Trigger.MADE_ROOM) if over else ""
-        if now - self._planned_at < INTERVAL:
+        if t - self._planned_at < INTERVAL:
             return ""
-        if recovery.stalled(now):
+        if recovery.stalled(t):
             return Trigger.STALLED
-        if recovery.held(now, pose):
+        if recovery.held(t, pose):
             return Trigger.CONSTRAINED
-        if self._movers is not None and now - self._planned_at >= self._policy.min_interval:
-            due = self._movers.trigger(tick, pose, tracked, arc)
+        if self._movers is not None and t - self._planned_at >= self._policy.min_interval:
+            due = self._movers.trigger(tracked, arc)
             if due:
                 return due
         if self._checked == self.survey.whole:
@@ -300,37 +301,37 @@ class Exploration(RouteGuide):
             return Trigger.STRAYED
         return Trigger.DISCOVERED if hit else ""
 
-    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """Return a new path from a pose; None if there is none, or a scan turn comes first."""
-        now, spent = tick / self._hz, clock()
-        self._planned_at, self._tick = now, tick
+    def replan(self, now: Moment, trigger: str) -> TrackedPath | None:
+        """Return a new path; None if there is none, or a scan turn comes first."""
+        t, pose, spent = now.observed.t, now.pose, clock()
+        self._planned_at, self._tick = t, now.tick
         if trigger in (Trigger.STALLED, Trigger.CONSTRAINED, Trigger.BACKED_OFF, Trigger.MADE_ROOM, Trigger.SCAN_TURN):
-            recovers, way = self._recovered(now, pose, trigger)
+            recovers, way = self._recovered(t, pose, trigger)
             if way is not None:
-                self.note(now, trigger, spent(), 0, way.length, way.route.xy)
+                self.note(t, trigger, spent(), 0, way.length, way.route.xy)
             if recovers:
                 return way
         if self._failures >= PATIENCE and trigger != Trigger.SCAN_TURN:
             self._failures = 0
             self.survey.reset(pose)
-        grid, plan, avoided = self._plan_around(tick, pose, trigger)
+        grid, plan, avoided = self._plan_around(pose, trigger)
         self.lost = not (plan.solved and len(plan.cells)) or bool(self._routes.plan_error)
         if not self.lost:
             self._failures = 0
             route, tracked = self._route(pose, grid, plan, avoided)
-            self.note(now, trigger, spent(), plan.work, plan.cost, route.xy)
+            self.note(t, trigger, spent(), plan.work, plan.cost, route.xy)
             return tracked
-        self.note(now, trigger, spent(), plan.work)
+        self.note(t, trigger, spent(), plan.work)
         self._failures += 1
-        self._recovery.note_rest(now, pose)
+        self.recovery.note_rest(t, pose)
         if self._failures >= PATIENCE:
-            self._gave_up_at = now
-            self._recovery.begin_scan_turn(pose)
+            self._gave_up_at = t
+            self.recovery.begin_scan_turn(pose)
         return None
 
     def _recovered(self, now: float, pose: Pose, trigger: str) -> tuple[bool, TrackedPath | None]:
         """Start a recovery; return whether it replaces planning, and the path that it follows."""
-        recovery = self._recovery
+        recovery = self.recovery
         if trigger == Trigger.SCAN_TURN:
             recovery.end_scan_turn(now, pose)
             return False, None
@@ -348,16 +349,12 @@ class Exploration(RouteGuide):
         way = self._prepare(route, SEEN.among(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
         return True, dataclasses.replace(way, backwards=recovery.backwards)
 
-    def note_command(self, tick: int, held: Twist | None, idle: bool) -> None:
-        """Note the twist that the stopping constraint reduced to a stop, None if it did not, and whether the robot is idle."""
-        self._recovery.note_command(tick / self._hz, held, idle)
-
     def failure_note(self, tick: int) -> str:
         """Return a note that the latest searches found no path; empty if one did, or after `LATELY`."""
         if tick / self._hz - self._gave_up_at > LATELY:
             return ""
         return f"no way through what was seen, last at t = {self._gave_up_at:.1f} s"
 
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+    def logged(self, log: Drive, per_tick: int) -> dict[str, Any]:
         """Return the array `seen`: the discs behind each plan. `cells` is empty, since the log has no grid for them."""
         return {"seen": table_logged(self._seen, 4, log, per_tick), "cells": np.empty((0, 2), dtype=np.int32)}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import abc
 import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
@@ -11,16 +10,16 @@ import numpy as np
 
 from antdrive.base import Floats, Pose
 from antdrive.base.plane import arc_lengths
-from antdrive.planners import PlanResult, TimedPlan
+from antdrive.planners import TimedPlan
 from antdrive.robots import Observation, TrackedPath
 from antdrive.sim.driving.blockage import Blockage
-from antdrive.sim.driving.parts import Ending, Rows, Step, StuckClock
+from antdrive.sim.driving.parts import Drive, Ending, Step, StuckClock
 from antdrive.sim.driving.recovery import ScanTurn
 from antdrive.sim.driving.route_planner import RoutePlanner
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ReplanRecord, finite_or_none
 from antdrive.sim.policy import Trigger
-from antdrive.worlds import Grid, Route
+from antdrive.worlds import Route
 
 NO_ROUTE: Floats = np.empty((0, 2))
 LOOKAHEAD = 0.4  # lookahead of the schedule's speed limit [s]
@@ -141,15 +140,22 @@ class Guide:
         """Return the guide's addition to the reason of a drive that is stuck or timed out; may be empty."""
         return ""
 
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+    def logged(self, log: Drive, per_tick: int) -> dict[str, Any]:
         """Return the guide's arrays for the log."""
         return {}
 
 
-class RouteGuide(Guide, abc.ABC):
-    """Guide that also plans the first route. The defaults keep it."""
+class RouteGuide(Guide):
+    """Guide with a route planner. The defaults keep the first route.
 
-    _blocked = ""  # which mover blocks every route, once the robot's patience is over
+    Attributes:
+        schedule: that of the timed plan; None without one
+        blockage: failed searches behind standing movers; None if it does not replan among them
+    """
+
+    schedule: Schedule | None = None
+    blockage: Blockage | None = None
+    _last: Follow | None = None
     _may_wait = False  # whether a robot at the end of its route may wait for a new one
 
     def __init__(self, planner: RoutePlanner) -> None:
@@ -161,42 +167,29 @@ class RouteGuide(Guide, abc.ABC):
         """Clearance of plans that keep the footprint clear [m]; None while all keep the disc clear."""
         return self._routes.footprint_margin
 
-    @abc.abstractmethod
-    def first(self) -> tuple[Grid, PlanResult]:
-        """Plan from the start; return the grid and the checked plan."""
-
-    @abc.abstractmethod
-    def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
-        """Check an external plan on the grid of `first`."""
-
-    @abc.abstractmethod
-    def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
-        """Return the route of a plan, and its path for the controller."""
-
     def path(self, now: Moment, *, at_end: bool = False) -> Follow | Wait | GiveUp:
         """Return the way of a control period, along a new route if one is due and found."""
-        tick, pose, path = now.tick, now.pose, now.way.path
+        path = now.way.path
         if at_end and self._may_wait:
             return self._way(path)
-        asked = tick, pose, now.waiting, path, now.before.pursuit.arc
-        trigger = Trigger.MISSED if at_end else self.trigger(*asked)
-        found = self.replan(tick, pose, trigger) if trigger else None
+        trigger = Trigger.MISSED if at_end else self.trigger(now)
+        found = self.replan(now, trigger) if trigger else None
         if at_end and not found and self._may_wait:
             return self._way(path)
         if error := self._routes.plan_error:
-            return GiveUp(Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {error}"))
+            return GiveUp(Ending(Outcome.INVALID_PLAN, f"on the way, at t = {now.observed.t:g} s: {error}"))
         if at_end:
             return self._way(found) if found else GiveUp()
-        if self._blocked:
-            return GiveUp(Ending(Outcome.BLOCKED, self._blocked))
-        return self._way(self._refreshed(found or path, pose))
+        if self.blockage is not None and self.blockage.reason:
+            return GiveUp(Ending(Outcome.BLOCKED, self.blockage.reason))
+        return self._way(self._refreshed(found or path, now.pose))
 
-    def trigger(self, tick: int, pose: Pose, waiting: bool, path: TrackedPath, arc: float) -> str:
+    def trigger(self, now: Moment) -> str:
         """Return why a new path is due; empty if none is."""
         return ""
 
-    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """Return a new path from a pose [m, m, rad]; None if there is none."""
+    def replan(self, now: Moment, trigger: str) -> TrackedPath | None:
+        """Return a new path; None if there is none."""
         return None
 
     def _refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
@@ -204,7 +197,9 @@ class RouteGuide(Guide, abc.ABC):
         return path
 
     def _way(self, path: TrackedPath) -> Follow:
-        return Follow(path)
+        if self._last is None or path is not self._last.path:
+            self._last = Follow(path, self.schedule, self.blockage)
+        return self._last
 
     def note(
         self, t: float, trigger: str, wall_s: float = 0.0, work: int = 0, cost: float = math.inf, xy: Floats = NO_ROUTE

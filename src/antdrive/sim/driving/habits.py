@@ -58,7 +58,7 @@ class Habits:
     """
 
     def __init__(self, movers: PerceivedMovers, hz: int) -> None:
-        self._movers, self._hz = movers, hz
+        self._movers = movers
         self._every = max(1, round(PERIOD * hz))  # control periods
         self._period = self._every / hz  # [s]
         self._old = round(AGO / self._period)
@@ -67,20 +67,19 @@ class Habits:
         self._squares: dict[tuple[int, int], list[tuple[int, int]]] = {}  # way and index of its positions by square
         self._known: list[Way] = []
 
-    def predict(
-        self, tick: int, position: Point, ahead: Floats, places: Floats, radii: Floats
-    ) -> tuple[Floats, Floats]:
+    def predict(self, ahead: Floats, places: Floats) -> tuple[Floats, Floats]:
         """Return other positions (K, G, 2) [m] of movers at times ahead (K,) [s], and these movers' radii (G,) [m].
 
-        Call it in every control period. `places` (K, M, 2) and `radii` (M,) are those at constant velocity.
+        Call it in every control period. `places` (K, M, 2) are those at constant velocity.
         """
-        if tick % self._every == 0:
-            self._observe(tick, position)
-        index = {number: m for m, number in enumerate(self._movers.within_range(tick, position).tolist())}
+        movers, radii = self._movers, self._movers.near.radii
+        if movers.tick % self._every == 0:
+            self._observe()
+        index = {number: m for m, number in enumerate(movers.near.numbers.tolist())}
         others: list[tuple[int, Floats]] = []
         for way in self._known:
             if way.number in index:
-                there, m = way.at(tick / self._hz + ahead), index[way.number]
+                there, m = way.at(movers.t + ahead), index[way.number]
                 same = (places[:, m], *(other for number, other in others if number == m))
                 if all(np.hypot(*(there - other).T).max() > APART for other in same):
                     others.append((m, there))
@@ -88,27 +87,25 @@ class Habits:
             return places[:, :0], radii[:0]
         return np.stack([there for _, there in others], axis=1), radii[[m for m, _ in others]]
 
-    def _observe(self, tick: int, position: Point) -> None:
+    def _observe(self) -> None:
         """Remember where the perceived movers are, and recall what those near the robot may do."""
-        numbers, everywhere = self._movers.perceived(tick, position)
-        velocities = self._movers.velocities(tick, position)
+        movers = self._movers
         self._known = []
-        for number, velocity in zip(numbers.tolist(), velocities.tolist(), strict=True):
-            x, y = everywhere[number].tolist()
+        for number, (x, y), velocity, _ in zip(*(part.tolist() for part in movers.near), strict=True):
             speed = math.hypot(*velocity)
-            taken = self._way_of(number, tick, (x, y), speed)
+            taken = self._way_of(number, movers.tick, (x, y), speed)
             way = self._ways[taken][1]
             if speed >= STANDS:
                 square = self._squares.setdefault((math.floor(x / NEAR), math.floor(y / NEAR)), [])
                 square.append((taken, len(way)))
                 del square[:-KEPT]
             way.append((x, y))
-            if speed >= STANDS and math.dist((x, y), position) <= REACH + 2 * speed:
+            if speed >= STANDS and math.dist((x, y), movers.position) <= REACH + 2 * speed:
                 for forwards in (True, False):
                     points, pace = self._recalled(number, (x, y), velocity, forwards)
                     if len(points) > 1:
                         moved = np.array(points) + (np.array((x, y)) - points[0])
-                        self._known.append(Way(number, moved, self._period * pace, tick / self._hz))
+                        self._known.append(Way(number, moved, self._period * pace, movers.t))
 
     def _way_of(self, number: int, tick: int, place: Point, speed: float) -> int:
         """Return the index of a mover's way: a new one after a gap in time or a jump."""

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from antdrive.base import Floats, Pose
 from antdrive.robots.lidar import Lidar
-from antdrive.sim.driving.parts import Rows, table_logged
+from antdrive.sim.driving.parts import Drive, table_logged
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import Ground, MappedGround, MoverTracker, TrackedMovers, ends
 
@@ -23,6 +23,7 @@ class MoverTracking:
     Attributes:
         tracker: detects and tracks movers
         tick: the control period of the last scan
+        hz: control periods per second
         sight: area covered by its beams within `reach` [m^2]
         reach: range up to which beams lie no farther apart than a map cell [m]
     """
@@ -33,13 +34,13 @@ class MoverTracking:
         self.sight, self.reach = 0.0, min(lidar.max_range, MAP_CELL / lidar.spacing)
         self._last: tuple[Pose, Floats, npt.NDArray[np.bool_]] | None = None
         self._known_corners: Floats | None = None
-        self._hz, self._spacing, self._lidar = hz, lidar.spacing, lidar
+        self.hz, self._spacing, self._lidar = hz, lidar.spacing, lidar
         self._settle = max(2, round(self.tracker.rules[False].settle * lidar.rate))
         self._log: list[tuple[int, TrackedMovers]] = []
 
     def read(self, ground: Ground, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
         """Update the tracks with a scan; return which beams hit tracked movers (beams,)."""
-        theirs = self.tracker.update(ground, pose, ranges, tick / self._hz)
+        theirs = self.tracker.update(ground, pose, ranges, tick / self.hz)
         self.tick = tick
         crossed = np.clip(ranges, 0.0, self.reach)
         self.sight = float(0.5 * self._spacing * (crossed * crossed).sum())
@@ -69,16 +70,16 @@ class MoverTracking:
         hides = np.where(steps[jumps] > 0, wide[:-1], wide[1:]) & np.isfinite(ranges[nearer]) & ~theirs[nearer]
         return ends(self._lidar, pose, ranges, nearer[hides])
 
-    def update_on_map(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
-        """Update with a scan of a robot that makes its own map, before the map takes the scan."""
-        return self.read(MappedGround(seen, self._settle), pose, ranges, tick)
+    def ground(self, seen: OccupancyMap) -> MappedGround:
+        """Return the ground of a robot that makes its own map, before the map takes the scan."""
+        return MappedGround(seen, self._settle)
 
     def standing(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> Floats:
         """Return an unprocessed scan without hits on possible movers (beams,) [m]: those ranges are infinite."""
-        ground = MappedGround(seen, self._settle)
-        return np.where(self.tracker.suspected(ground, pose, ranges, tick / self._hz), np.inf, ranges)
+        ground = self.ground(seen)
+        return np.where(self.tracker.suspected(ground, pose, ranges, tick / self.hz), np.inf, ranges)
 
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+    def logged(self, log: Drive, per_tick: int) -> dict[str, Any]:
         """Return the array `tracks` of a log (K, 7)."""
         lines = (
             (tick, np.column_stack((movers.numbers, movers.positions, movers.velocities, movers.radii)))

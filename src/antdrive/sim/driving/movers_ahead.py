@@ -42,16 +42,15 @@ class Traffic:
         samples: equivalent number of independent positions
     """
 
-    def __init__(self, predictor: PerceivedMovers, radius: float, bounds: Bounds, hz: int) -> None:
+    def __init__(self, movers: PerceivedMovers, radius: float, bounds: Bounds, hz: int) -> None:
         self.box, self.samples = _nowhere(), 0.0
-        self._predictor, self._radius, self._hz = predictor, radius, hz
+        self._movers, self._radius, self._hz = movers, radius, hz
         self._area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
         self._noted = _nowhere()
 
-    def observe(self, tick: int, position: Point) -> None:
-        """Note the movers that the robot perceives in a tick from a position [m]."""
-        perceived, places = self._predictor.perceived(tick, position)
-        self._note(places[perceived], 1 / self._hz)
+    def observe(self) -> None:
+        """Note the movers that the robot perceives."""
+        self._note(self._movers.near.positions, 1 / self._hz)
 
     def _note(self, places: Floats, period: float) -> None:
         """Note positions of movers (N, 2) [m], a period [s] after the last ones."""
@@ -64,29 +63,30 @@ class Traffic:
         """Return whether a side of the box has moved outwards by more than this [m] since the last `zones`."""
         return bool(self.samples) and bool((np.abs(self.box - self._noted) > by).any())
 
-    def rate(self, tick: int, position: Point) -> float:
-        """Return how many movers would meet a standing robot per second [1/s].
+    @property
+    def rate(self) -> float:
+        """How many movers would meet a standing robot per second [1/s].
 
         Each mover sweeps the ground where it would touch the robot: a strip as wide as both, at the mover's speed.
         """
-        places, radii = self._predictor.predict(tick, position, np.array([0.0, SOON]))
+        places, radii = self._movers.predict(np.array([0.0, SOON])), self._movers.near.radii
         speeds = np.hypot(*(places[1] - places[0]).T) / SOON
         return float((2 * (radii + self._radius) * speeds).sum() / self._area)
 
-    def widest(self, tick: int, position: Point) -> float:
-        """Return the largest radius of the movers perceived from a position [m]."""
-        return float(self._predictor.predict(tick, position, np.zeros(1))[1].max(initial=0.0))
+    @property
+    def widest(self) -> float:
+        """Largest radius of the perceived movers [m]."""
+        return float(self._movers.near.radii.max(initial=0.0))
 
-    def zones(self, tick: int, position: Point, goal: Point, grid: Grid) -> list[Zone]:
-        """Return the zones that movers roam, seen from a position [m]: the estimated box, then the observed one.
+    def zones(self, goal: Point, grid: Grid) -> list[Zone]:
+        """Return the zones that movers roam: the estimated box, then the observed one.
 
         The box of n uniform samples is too small by a fraction of about 1 / (n + 1) on each side.
         """
         self._noted = self.box.copy()
-        radius = self.widest(tick, position)
         unseen = (self.box[2:] - self.box[:2]) / (self.samples + 1)
         larger = np.concatenate((self.box[:2] - unseen, self.box[2:] + unseen))
-        return [Zone(box, radius, position, goal, grid) for box in (larger, self.box.copy())]
+        return [Zone(box, self.widest, self._movers.position, goal, grid) for box in (larger, self.box.copy())]
 
 
 class TrackedTraffic(Traffic):
@@ -96,37 +96,38 @@ class TrackedTraffic(Traffic):
     world.
     """
 
-    def __init__(self, predictor: Tracked, spec: RobotSpec, hz: int) -> None:
-        super().__init__(predictor, spec.radius, (0.0, 0.0, 1.0, 1.0), hz)
-        self._tracks, self._fast = predictor, FAST * spec.max_speed
+    def __init__(self, movers: Tracked, spec: RobotSpec, hz: int) -> None:
+        super().__init__(movers, spec.radius, (0.0, 0.0, 1.0, 1.0), hz)
+        self._tracks, self._fast = movers, FAST * spec.max_speed
         self._last, self._lately, self._most = -1, 0.0, 0.0
 
-    def observe(self, tick: int, position: Point) -> None:
-        """Note the movers of the last scan, if it is new, from a position [m]."""
+    def observe(self) -> None:
+        """Note the movers of the last scan, if it is new."""
         tracking = self._tracks.tracking
         if tracking.tick == self._last:
             return
         period = (tracking.tick - self._last) / self._hz
         self._last = tracking.tick
-        self._note(self._tracks.visible(tick), period)
+        self._note(self._tracks.visible, period)
         kept = math.exp(-period / MEMORY)
         self._lately *= kept
         if tracking.sight:
-            self._lately += (1 - kept) * self._sweep(tick, position, tracking.reach) / tracking.sight
+            self._lately += (1 - kept) * self._sweep(tracking.reach) / tracking.sight
         self._most = max(self._lately, self._most * math.exp(-period / FADING))
 
-    def rate(self, tick: int, position: Point) -> float:
-        """Return how many fast movers would meet a standing robot per second on visible ground [1/s].
+    @property
+    def rate(self) -> float:
+        """How many fast movers would meet a standing robot per second on visible ground [1/s].
 
         Hidden movers still exist, so the highest rate observed counts and fades slowly.
         """
         return self._most
 
-    def _sweep(self, tick: int, position: Point, reach: float) -> float:
+    def _sweep(self, reach: float) -> float:
         """Return the area that fast movers within reach [m] sweep per second [m^2/s]."""
-        places, radii = self._predictor.predict(tick, position, np.array([0.0, 1.0]))
+        places, radii = self._movers.predict(np.array([0.0, 1.0])), self._movers.near.radii
         speeds = np.hypot(*(places[1] - places[0]).T)
-        counts = (np.hypot(*(places[0] - position).T) - radii <= reach) & (speeds >= self._fast)
+        counts = (np.hypot(*(places[0] - self._movers.position).T) - radii <= reach) & (speeds >= self._fast)
         return float((2 * (radii + self._radius) * speeds)[counts].sum())
 
 
@@ -218,93 +219,95 @@ class MoversAhead:
         policy: ReplanPolicy,
         goal: Point,
         grid: Grid,
-        hz: int,
         traffic: Traffic | None,
         blockage: Blockage | None = None,
     ) -> None:
-        self._predictor, self._policy, self._goal, self._grid, self._hz = movers, policy, goal, grid, hz
+        self._movers, self._policy, self._goal, self._grid = movers, policy, goal, grid
         self._traffic, self._blockage = traffic, blockage
         self._waiting_since = math.nan
         self._nearest, self._replanned = math.inf, [math.inf] * REPLANS
 
-    def observe(self, tick: int, pose: Pose, waiting: bool) -> None:
+    def observe(self, waiting: bool) -> None:
         """Note the perceived movers and the waiting time of one control period."""
         if self._traffic is not None:
-            self._traffic.observe(tick, pose[:2])
-        self._nearest = min(self._nearest, math.dist(pose[:2], self._goal))
+            self._traffic.observe()
+        self._nearest = min(self._nearest, math.dist(self._movers.position, self._goal))
         if not waiting:
             self.reset_wait()
         elif math.isnan(self._waiting_since):
-            self._waiting_since = tick / self._hz
+            self._waiting_since = self._movers.t
 
     def reset_wait(self) -> None:
         """Reset the waiting time."""
         self._waiting_since = math.nan
 
-    def trigger(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> str:
+    def trigger(self, tracked: TrackedPath, arc: float) -> str:
         """Return why movers make a new route due; empty if they do not.
 
         After `REPLANS` around movers for a metre of progress towards the goal, the robot keeps its route until it has waited
         or traffic grows.
         """
         policy = self._policy
-        if tick / self._hz - self._waiting_since >= policy.max_wait:
+        if self._movers.t - self._waiting_since >= policy.max_wait:
             self.reset_wait()
             return Trigger.WAITED
-        if self._replanned[-REPLANS] - self._nearest >= PROGRESS and self._obstructed(tick, pose, tracked, arc):
+        if self._replanned[-REPLANS] - self._nearest >= PROGRESS and self._obstructed(tracked, arc):
             self._replanned.append(self._nearest)
             return Trigger.OBSTRUCTED
         traffic = self._traffic
-        if traffic is None or not traffic.grown(self._grid.cell) or not self.heavy(tick, pose):
+        if traffic is None or not traffic.grown(self._grid.cell) or not self.heavy:
             return ""
-        return Trigger.TRAFFIC if self.zones(tick, pose, self._around(pose))[-1].crossed(tracked, arc) else ""
+        return Trigger.TRAFFIC if self.zones(self._around)[-1].crossed(tracked, arc) else ""
 
-    def _obstructed(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
+    def _obstructed(self, tracked: TrackedPath, arc: float) -> bool:
         """Return whether movers will cover the route ahead."""
-        return obstructs_route(self.discs(tick, pose), tracked, arc, self._policy.obstruction_range, self._grid.inflate)
+        return obstructs_route(self.discs(), tracked, arc, self._policy.obstruction_range, self._grid.inflate)
 
-    def heavy(self, tick: int, pose: Pose) -> bool:
-        """Return whether traffic is heavy enough to plan around zones."""
-        return self._traffic is not None and self._traffic.rate(tick, pose[:2]) > self._policy.max_traffic
+    @property
+    def heavy(self) -> bool:
+        """Whether traffic is heavy enough to plan around zones."""
+        return self._traffic is not None and self._traffic.rate > self._policy.max_traffic
 
-    def discs(self, tick: int, pose: Pose) -> list[Disc]:
+    def discs(self) -> list[Disc]:
         """Return the discs that movers will cover soon; they close neither the robot's position nor the goal.
 
         Discs are larger where the robot has waited beside a mover.
         """
-        ends = np.array([pose[:2], self._goal])
-        covered = covered_discs(self._predictor, tick, ends, self._policy.prediction_time, self._grid)
-        return covered if self._blockage is None else covered + self._blockage.discs(tick, ends)
+        ends = np.array([self._movers.position, self._goal])
+        covered = covered_discs(self._movers, ends, self._policy.prediction_time, self._grid)
+        return covered if self._blockage is None else covered + self._blockage.discs(ends)
 
-    def zones(self, tick: int, pose: Pose, grid: Grid) -> list[Zone]:
+    def zones(self, grid: Grid) -> list[Zone]:
         """Return the zones that movers roam, largest first: the estimated box, then the observed one."""
         assert self._traffic is not None
-        return self._traffic.zones(tick, pose[:2], self._goal, grid)
+        return self._traffic.zones(self._goal, grid)
 
-    def waiting_is_quicker(self, tick: int, pose: Pose, trigger: str, speed: float, around: float, free: float) -> bool:
+    def waiting_is_quicker(self, trigger: str, speed: float, around: float, free: float) -> bool:
         """Return whether a route `around` movers [m] takes longer than to wait for them and take the `free` one [m].
 
         Routes are driven at a speed [m/s]. A robot that has waited, or that sees only standing movers, takes any route.
         """
         if trigger == Trigger.WAITED or around <= free + self._policy.max_wait * speed:
             return False
-        return bool((np.hypot(*self._predictor.velocities(tick, pose[:2]).T) >= STANDS).any())
+        return bool((np.hypot(*self._movers.near.velocities.T) >= STANDS).any())
 
     def plan_around_zones(
-        self, pose: Pose, zones: list[Zone], discs: list[Disc], plan: Callable[[list[Disc], Zone], PlanResult]
+        self, zones: list[Zone], discs: list[Disc], plan: Callable[[list[Disc], Zone], PlanResult]
     ) -> tuple[PlanResult, list[Disc]] | None:
         """Return a plan around the first zone without a long detour, and its discs; None if all detours are too long."""
-        reach, longest = self._policy.obstruction_range, self._policy.max_detour * math.dist(pose[:2], self._goal)
+        reach, here = self._policy.obstruction_range, self._movers.position
+        longest = self._policy.max_detour * math.dist(here, self._goal)
         for zone in zones:
             # Distant movers will have moved on and must not close the only route to the goal.
-            near = [d for d in discs if math.dist((d.x, d.y), pose[:2]) <= reach and zone.holds(d)]
+            near = [d for d in discs if math.dist((d.x, d.y), here) <= reach and zone.holds(d)]
             answer = plan(near, zone)
             if answer.cost <= longest:
                 return answer, near + zone.discs
         return None
 
-    def _around(self, pose: Pose) -> Grid:
-        """Return the grid on which routes are checked against zones."""
+    @property
+    def _around(self) -> Grid:
+        """The grid on which routes are checked against zones."""
         return self._grid
 
 
@@ -319,30 +322,30 @@ class MoversSeenAhead(MoversAhead):
         spec: RobotSpec,
         goal: Point,
         inflate: float,
-        hz: int,
     ) -> None:
         grid = rasterise(World("measure", (0.0, 0.0, 1.0, 1.0)), COARSE, inflate)
-        self._roamed = TrackedTraffic(tracked, spec, hz)
-        super().__init__(tracked, policy, goal, grid, hz, self._roamed)
+        self._roamed = TrackedTraffic(tracked, spec, tracked.tracking.hz)
+        super().__init__(tracked, policy, goal, grid, self._roamed)
         self._survey = survey
 
-    def discs(self, tick: int, pose: Pose) -> list[Disc]:
+    def discs(self) -> list[Disc]:
         """Return the discs that movers will cover soon; they close neither the robot's position nor the goal."""
-        return super().discs(tick, pose) if len(self._predictor.within_range(tick, pose[:2])) else []
+        return super().discs() if len(self._movers.near.numbers) else []
 
-    def _around(self, pose: Pose) -> Grid:
-        (x, y), (gx, gy) = pose[:2], self._goal
+    @property
+    def _around(self) -> Grid:
+        (x, y), (gx, gy) = self._movers.position, self._goal
         around = self.bounds((min(x, gx) - 1.0, min(y, gy) - 1.0, max(x, gx) + 1.0, max(y, gy) + 1.0))
         return rasterise(World("around movers", around), COARSE, self._grid.inflate)
 
-    def zones(self, tick: int, pose: Pose, grid: Grid) -> list[Zone]:
+    def zones(self, grid: Grid) -> list[Zone]:
         """Return the zones, largest first: all but a lane along the outermost walls, the estimated box, the observed one."""
-        zones = self._roamed.zones(tick, pose[:2], self._goal, grid)
-        roamed, radius = self._roamed.box, self._roamed.widest(tick, pose[:2])
+        zones = self._roamed.zones(self._goal, grid)
+        roamed, radius = self._roamed.box, self._roamed.widest
         lane = radius + 2 * self._grid.inflate + SLACK
         lower, upper = self._outermost()
         inner = np.concatenate((np.minimum(lower + lane, roamed[:2]), np.maximum(upper - lane, roamed[2:])))
-        return [Zone(inner, radius, pose[:2], self._goal, grid), *zones]
+        return [Zone(inner, radius, self._movers.position, self._goal, grid), *zones]
 
     def bounds(self, least: Bounds) -> Bounds:
         """Return bounds that contain a route around the zones."""

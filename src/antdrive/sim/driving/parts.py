@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -75,24 +76,26 @@ class StuckClock(NamedTuple):
         return why
 
 
-class Rows(Protocol):
-    """Rows of a log, one per physics step."""
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Log of a drive: T rows, one per physics step; row 0 is the start."""
 
-    @property
-    def t(self) -> Floats:
-        """Times since the start (T,) [s]."""
-
-    @property
-    def pose(self) -> Floats:
-        """True poses (T, 3) [m, m, rad]."""
-
-    @property
-    def actuated(self) -> Floats:
-        """Motor targets (T, 2) [m/s, rad/s]."""
+    outcome: Outcome  # how the drive ended
+    reason: str  # details beyond the outcome's sentence; may be empty
+    t: Floats  # times since the start (T,) [s]
+    pose: Floats  # true poses of the axle's centre (T, 3) [m, m, rad]
+    twist: Floats  # measured speeds and yaw rates (T, 2) [m/s, rad/s]
+    command: Floats  # commands in force before each row (T, 2) [m/s, rad/s]
+    clearance: Floats  # distances from the footprint to the nearest obstacle, mover or wall (T,) [m]
+    limiter: np.ndarray[tuple[int], np.dtype[np.uint8]]  # limiting rule (T,), an index into `LIMITERS`
+    movers: Floats  # positions of the movers (T, M, 2) [m]
+    contacts: Floats  # one row per contact (K, 4): row, obstacle, distance [m], force [N]
+    actuated: Floats  # motor targets (T, 2) [m/s, rad/s]
+    physics: str  # why contacts in physics are no evidence, see `Engine.audit`; else empty
 
 
 def table_logged(
-    taken: Iterable[tuple[int, npt.NDArray[Any]]], columns: int, log: Rows, per_tick: int
+    taken: Iterable[tuple[int, npt.NDArray[Any]]], columns: int, log: Drive, per_tick: int
 ) -> npt.NDArray[np.float32]:
     """Return a table (K, columns) of a log: entries noted in control periods; each begins with the log row of its period."""
     kept = [(tick * per_tick, lines) for tick, lines in taken if tick * per_tick < len(log.t)]

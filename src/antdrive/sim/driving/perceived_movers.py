@@ -2,142 +2,82 @@
 
 from __future__ import annotations
 
-import abc
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from antdrive.base import Floats, Point
-from antdrive.robots.control.observation import NOBODY, Movers
+from antdrive.base import Floats
+from antdrive.robots.control.observation import NOBODY, Movers, Observation
 from antdrive.sim.policy import Perception
 
 if TYPE_CHECKING:
     from antdrive.sim.driving.mover_tracking import MoverTracking
-    from antdrive.sim.sensing.tracking import TrackedMovers
 
 STANDS = 0.08  # tracks slower than this stand still [m/s]
 
-#: Numbers (P,) that identify movers.
-Numbers: TypeAlias = npt.NDArray[np.int64]
 
-
-class PerceivedMovers(abc.ABC):
-    """Perceived movers within range, predicted at constant velocity.
+class PerceivedMovers:
+    """Movers that a robot is given, as it perceives them in a control period, predicted at constant velocity.
 
     Attributes:
         uncertain: whether movers may deviate from their prediction
-    """
-
-    uncertain = True
-
-    def __init__(self, perception: Perception, hz: int) -> None:
-        self._perception, self._hz = perception, hz
-
-    @abc.abstractmethod
-    def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
-        """Return the numbers (M,) of all movers in a tick, positions (M, 2) [m], velocities (M, 2) [m/s] and radii (M,) [m]."""
-
-    @property
-    @abc.abstractmethod
-    def count(self) -> int:
-        """Number of movers so far."""
-
-    @abc.abstractmethod
-    def radius_of(self, mover: int) -> float:
-        """Return the radius of a mover [m]."""
-
-    @abc.abstractmethod
-    def name_of(self, mover: int) -> str:
-        """Return the name of a mover in messages."""
-
-    def perceived(self, tick: int, position: Point) -> tuple[Numbers, Floats]:
-        """Return the numbers (P,) of the perceived movers, and all positions by number (M, 2) [m]; nan where unknown."""
-        numbers, places, _, _ = self._now(tick)
-        everywhere = np.full((self.count, 2), np.nan)
-        everywhere[numbers] = places
-        return self.within_range(tick, position), everywhere
-
-    def predict(self, tick: int, position: Point, ahead: Floats) -> tuple[Floats, Floats]:
-        """Return the positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
-        _, places, velocities, radii = self._near(tick, position)
-        # Flat rows: numpy takes longer for pairs of numbers.
-        flat = places.reshape(-1) + ahead[:, None] * velocities.reshape(-1)
-        return flat.reshape(len(ahead), -1, 2), radii
-
-    def near(self, tick: int, position: Point) -> Movers:
-        """Return the perceived movers, with the observed velocities."""
-        return Movers(*self._near(tick, position))
-
-    def velocities(self, tick: int, position: Point) -> Floats:
-        """Return the observed velocities of the perceived movers (M, 2) [m/s]."""
-        return self.near(tick, position).velocities
-
-    def within_range(self, tick: int, position: Point) -> Numbers:
-        """Return the numbers (P,) of the perceived movers."""
-        return self._near(tick, position)[0]
-
-    def _near(
-        self, tick: int, position: Point, observed: Floats | None = None
-    ) -> tuple[Numbers, Floats, Floats, Floats]:
-        numbers, places, velocities, radii = self._now(tick)
-        velocities = velocities if observed is None else observed
-        if self._perception.range == math.inf:
-            return numbers, places, velocities, radii
-        near = np.hypot(*(places - position).T) - radii <= self._perception.range
-        return numbers[near], places[near], velocities[near], radii[near]
-
-
-class Given(PerceivedMovers):
-    """Movers whose positions and velocities, or motions, the robot is given.
+        tick: the number of the control period
+        t: its time since the start [s]
+        position: where the robot is when its command takes effect [m]
+        near: the perceived movers, with the observed velocities
 
     Args:
-        perception: what it is given, and within which range
-        hz: control periods per second
+        perception: what the robot is given, and within which range
         count: number of all movers
         motions: positions (K, M, 2) [m] of all movers at times (K,) [s], if it is given their motions
     """
 
     def __init__(
-        self, perception: Perception, hz: int, count: int, motions: Callable[[Floats], Floats] | None = None
+        self, perception: Perception, count: int = 0, motions: Callable[[Floats], Floats] | None = None
     ) -> None:
-        super().__init__(perception, hz)
         self.uncertain = perception.kind in ("velocities", "lidar")
-        self._count, self._motions, self._given = count, motions, NOBODY
+        self._perception, self._count, self._motions = perception, count, motions
+        self.near = self._all = NOBODY
 
-    def read(self, movers: Movers) -> None:
-        """Note the movers that the robot is given in this control period."""
-        self._given = movers
+    def read(self, now: Observation) -> None:
+        """Note a control period, observed with the pose when its command takes effect."""
+        self.tick, self.t, self.position = now.tick, now.t, now.pose[:2]
+        self.near = self._all = movers = self._everybody(now)
+        if self._perception.range != math.inf and len(movers.numbers):
+            near = np.hypot(*(movers.positions - self.position).T) - movers.radii <= self._perception.range
+            self.near = Movers(*(part[near] for part in movers))
 
-    def predict(self, tick: int, position: Point, ahead: Floats) -> tuple[Floats, Floats]:
-        """Return the positions (K, M, 2) [m] of the perceived movers at times ahead (K,) [s], and their radii (M,) [m]."""
-        if self._motions is None:
-            return super().predict(tick, position, ahead)
-        perceived, _, _, radii = self._near(tick, position)
-        return np.ascontiguousarray(self._motions(ahead + tick / self._hz)[:, perceived]), radii
-
-    def near(self, tick: int, position: Point) -> Movers:
-        """Return the perceived movers, with the velocities also of those that are predicted to stay."""
-        return Movers(*self._near(tick, position, self._given.velocities))
-
-    def radius_of(self, mover: int) -> float:
-        """Return the radius of a mover [m]."""
-        return float(self._given.radii[self._given.numbers == mover][0])
-
-    def name_of(self, mover: int) -> str:
-        """Return the name of a mover in messages."""
-        return f"movers[{mover}]"
+    def _everybody(self, now: Observation) -> Movers:
+        return now.movers
 
     @property
     def count(self) -> int:
         """Number of movers so far."""
         return self._count
 
-    def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
-        numbers, places, velocities, radii = self._given
-        return numbers, places, np.zeros_like(velocities) if self._perception.kind == "positions" else velocities, radii
+    @property
+    def places(self) -> Floats:
+        """Positions of all movers by number (M, 2) [m]; nan where unknown."""
+        everywhere = np.full((self.count, 2), np.nan)
+        everywhere[self._all.numbers] = self._all.positions
+        return everywhere
+
+    def predict(self, ahead: Floats) -> Floats:
+        """Return the positions (K, P, 2) [m] of the perceived movers at times ahead (K,) [s]."""
+        numbers, places, velocities, _ = self.near
+        if self._motions is not None:
+            return np.ascontiguousarray(self._motions(ahead + self.t)[:, numbers])
+        if self._perception.kind == "positions":
+            velocities = np.zeros_like(velocities)
+        # Flat rows: numpy takes longer for pairs of numbers.
+        flat = places.reshape(-1) + ahead[:, None] * velocities.reshape(-1)
+        return flat.reshape(len(ahead), -1, 2)
+
+    def name_of(self, mover: int) -> str:
+        """Return the name of a mover in messages."""
+        return f"movers[{mover}]"
 
 
 class Tracked(PerceivedMovers):
@@ -147,34 +87,26 @@ class Tracked(PerceivedMovers):
         tracking: the tracks
     """
 
-    def __init__(self, tracking: MoverTracking, perception: Perception, hz: int) -> None:
-        super().__init__(perception, hz)
-        self.tracking = tracking
+    def __init__(self, tracking: MoverTracking, perception: Perception) -> None:
+        super().__init__(perception)
+        self.tracking, self.uncertain = tracking, True
 
     @property
     def count(self) -> int:
         """Number of movers so far."""
         return self.tracking.tracker.tracks_begun
 
-    def visible(self, tick: int) -> Floats:
-        """Return the positions of the movers hit by the last scan (N, 2) [m], in a tick; hidden movers are omitted."""
-        return self._now(tick)[1][self._tracks.met]
-
-    def radius_of(self, mover: int) -> float:
-        """Return the radius of a tracked mover [m]."""
-        return float(self._tracks.radii[self._tracks.numbers == mover][0])
+    @property
+    def visible(self) -> Floats:
+        """Positions of the movers hit by the last scan (N, 2) [m]; hidden movers are omitted."""
+        return self._all.positions[self.tracking.tracker.movers().met]
 
     def name_of(self, mover: int) -> str:
         """Return the name of a mover in messages."""
         return f"tracked mover {mover}"
 
-    @property
-    def _tracks(self) -> TrackedMovers:
-        """The movers at the last scan."""
-        return self.tracking.tracker.movers()
-
-    def _now(self, tick: int) -> tuple[Numbers, Floats, Floats, Floats]:
-        tracks = self._tracks
+    def _everybody(self, now: Observation) -> Movers:
+        tracks, tracking = self.tracking.tracker.movers(), self.tracking
         velocities = np.where(np.hypot(*tracks.velocities.T)[:, None] < STANDS, 0.0, tracks.velocities)
-        places = tracks.positions + (tick - self.tracking.tick) / self._hz * velocities
-        return tracks.numbers, places, velocities, tracks.radii
+        places = tracks.positions + (now.tick - tracking.tick) / tracking.hz * velocities
+        return Movers(tracks.numbers, places, velocities, tracks.radii)

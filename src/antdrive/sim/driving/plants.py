@@ -4,41 +4,21 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from antdrive.base import Floats, Pose
+from antdrive.base import Pose
 from antdrive.base.errors import FieldError
 from antdrive.robots import RobotSpec, Twist, footprint_clearance
 from antdrive.robots.clearance import kernel_shape
 from antdrive.robots.noise import moved
 from antdrive.sim.driving import _kernels_movers
-from antdrive.sim.driving.parts import Ending
+from antdrive.sim.driving.parts import Drive, Ending
 from antdrive.sim.log.ending import rows_after_contact
-from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import World
 
 STEP = 2e-4  # longest motion of a footprint point between two poses that a kinematic robot checks [m]
-
-
-@dataclass(frozen=True, eq=False)
-class Drive:
-    """Log of a drive: T rows, one per physics step; row 0 is the start."""
-
-    outcome: Outcome  # how the drive ended
-    reason: str  # details beyond the outcome's sentence; may be empty
-    t: Floats  # times since the start (T,) [s]
-    pose: Floats  # true poses of the axle's centre (T, 3) [m, m, rad]
-    twist: Floats  # measured speeds and yaw rates (T, 2) [m/s, rad/s]
-    command: Floats  # commands in force before each row (T, 2) [m/s, rad/s]
-    clearance: Floats  # distances from the footprint to the nearest obstacle, mover or wall (T,) [m]
-    limiter: np.ndarray[tuple[int], np.dtype[np.uint8]]  # limiting rule (T,), an index into `LIMITERS`
-    movers: Floats  # positions of the movers (T, M, 2) [m]
-    contacts: Floats  # one row per contact (K, 4): row, obstacle, distance [m], force [N]
-    actuated: Floats  # motor targets (T, 2) [m/s, rad/s]
-    physics: str  # why contacts in physics are no evidence, see `Engine.audit`; else empty
 
 
 class Bullet:

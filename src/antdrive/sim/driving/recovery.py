@@ -29,6 +29,7 @@ SPARE_TURN = 0.1  # part of a free turn that is left unused [rad]
 TURNED = 0.02  # tolerance of a target heading [rad]
 VIEWS = 3  # whole scans that must cover each direction
 PATIENT = 2.0  # a scan turn is given up after this multiple of its planned duration
+SHARPEST = 0.05  # arcs of a smaller radius are treated as turns on the spot [m]
 WAY = 1.0  # distance within which unknown ground is checked [m], [rad]
 WORTH_SEEING = 0.1  # unknown ground blocks the robot if it shortens the free path by this [m], [rad]
 STOPPED = 0.01  # a robot that turns more slowly has stopped [rad/s]
@@ -135,9 +136,9 @@ class Recovery:
         """Return whether the robot stands because ground ahead is unknown, rather than because of hits."""
         if self._wanted is None:
             return False
-        seen, open_ = (
-            self._survey.clear_way(pose, self._wanted, WAY, freespace=freespace) for freespace in (False, True)
-        )
+        speed, rate = self._wanted
+        arc = 0.0 if abs(speed) <= SHARPEST * abs(rate) else speed, rate
+        seen, open_ = (self._survey.clear_way(pose, *arc, WAY, freespace=freespace) for freespace in (False, True))
         return open_ > seen + WORTH_SEEING
 
     def begin_scan_turn(self, pose: Pose) -> bool:
@@ -174,7 +175,7 @@ class Recovery:
         self.backwards = len(points) > 1
         if not self.backwards:
             x, y, yaw = pose
-            ahead = min(length, self._survey.clear_distance(pose, 1.0, 0.0, 2 * length) - TRAIL)
+            ahead = min(length, self._survey.clear_way(pose, 1.0, 0.0, 2 * length) - TRAIL)
             if ahead < 2 * TRAIL:
                 return None
             points.append((x + ahead * math.cos(yaw), y + ahead * math.sin(yaw)))
@@ -199,7 +200,8 @@ class Recovery:
         """Yield the turns that let the lidar cover all directions, as far as they are free."""
         needed = FULL_CIRCLE - self._survey.lidar.field_of_view + OVERLAP
         left, right = (
-            min(needed, self._survey.clear_turn(pose, side, needed + SPARE_TURN) - SPARE_TURN) for side in (1.0, -1.0)
+            min(needed, self._survey.clear_way(pose, 0.0, side, needed + SPARE_TURN) - SPARE_TURN)
+            for side in (1.0, -1.0)
         )
         sides = ((left, 1.0), (right, -1.0)) if left >= right else ((right, -1.0), (left, 1.0))
         turned = 0.0

@@ -33,7 +33,7 @@ from antdrive.planners import (
 )
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blockage import Blockage, blocked_cells, covered_discs, points_at, with_obstacles
-from antdrive.sim.driving.guide import Follow
+from antdrive.sim.driving.guide import Moment
 from antdrive.sim.driving.movers_ahead import MoversAhead, Traffic
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.route_planner import RoutePlanner
@@ -51,12 +51,14 @@ class Replanning(OneRoute):
         policy: when to replan
     """
 
+    blockage: Blockage
+
     def __init__(
         self, planner: RoutePlanner, policy: ReplanPolicy, movers: PerceivedMovers, clearance: float = 0.0
     ) -> None:
         super().__init__(planner)
         self.policy = policy
-        self._predictor, self._clearance = movers, clearance
+        self._movers, self._clearance = movers, clearance
         self._task = dataclasses.replace(planner.task, world=dataclasses.replace(planner.task.world, movers=()))
         self._timed = bool(planner.motions)
         self._replanned_at = -math.inf
@@ -64,61 +66,54 @@ class Replanning(OneRoute):
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
         """Return the route of a plan, and its path for the controller."""
         self._grid, policy = grid, self.policy
-        movers, robot, task = self._predictor, self._routes.robot, self._task
-        self.blockage = Blockage(task, grid, movers, self._hz, policy, self._clearance)
+        movers, robot, task = self._movers, self._routes.robot, self._task
+        self.blockage = Blockage(task, grid, movers, policy, self._clearance)
         learns = policy.around_movers and movers.uncertain and not self._timed
         traffic = Traffic(movers, robot.radius, task.world.bounds, self._hz) if learns else None
-        self._ahead = MoversAhead(movers, policy, task.goal, grid, self._hz, traffic, self.blockage)
+        self._ahead = MoversAhead(movers, policy, task.goal, grid, traffic, self.blockage)
         return super().route(grid, plan)
 
-    @property
-    def _blocked(self) -> str:  # type: ignore[override]
-        return self.blockage.reason
-
-    def _way(self, path: TrackedPath) -> Follow:
-        return Follow(path, self.schedule, self.blockage)
-
-    def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
+    def trigger(self, now: Moment) -> str:
         """Return why a new route is due; empty if none is."""
-        now, policy = tick / self._hz, self.policy
-        self._ahead.observe(tick, pose, waiting)
-        if self.blockage.pause(tick, pose[:2]) or now - self._replanned_at < policy.min_interval:
+        t, policy, pose, tracked, arc = now.observed.t, self.policy, now.pose, now.way.path, now.before.pursuit.arc
+        self._ahead.observe(now.waiting)
+        if self.blockage.pause() or t - self._replanned_at < policy.min_interval:
             return ""
         deviation = math.dist(points_at(tracked, np.array([arc]))[0], pose[:2])
         shortfall = math.dist(tracked.route.xy[-1], pose[:2]) - (tracked.length - arc)
         if deviation > policy.max_deviation or shortfall > policy.max_shortfall:
             return Trigger.STRAYED
         if self._timed:
-            return Trigger.LATE if self.schedule is None or self.schedule.late(now, arc) else ""
-        due = self._ahead.trigger(tick, pose, tracked, arc) if policy.around_movers else ""
+            return Trigger.LATE if self.schedule is None or self.schedule.late(t, arc) else ""
+        due = self._ahead.trigger(tracked, arc) if policy.around_movers else ""
         if due == Trigger.WAITED:
-            self.blockage.note_gaps(tick, pose[:2], tracked, arc)
+            self.blockage.note_gaps(tracked, arc)
         return due
 
     @compiled()
-    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """Return a new path from a pose [m, m, rad]; None if there is none."""
-        now = tick / self._hz
-        self._replanned_at = now
+    def replan(self, now: Moment, trigger: str) -> TrackedPath | None:
+        """Return a new path; None if there is none."""
+        t, pose = now.observed.t, now.pose
+        self._replanned_at = t
         self._ahead.reset_wait()
         spent = clock()
         # Near the goal, local avoidance is enough.
         around_movers = self.policy.around_movers and trigger != Trigger.MISSED and not self._timed
-        discs = self._ahead.discs(tick, pose) if around_movers else []
+        discs = self._ahead.discs() if around_movers else []
         try:
             task = dataclasses.replace(self._task, start=pose)
         except ValueError:  # the estimated pose lies outside the world or in an obstacle
-            self.note(now, trigger)
+            self.note(t, trigger)
             return None
         if self._timed:
-            plan = self._routes.plan(self._routes.query(self._grid, task, now), self._routes.rng)
+            plan = self._routes.plan(self._routes.query(self._grid, task, t), self._routes.rng)
         else:
-            zones = self._ahead.zones(tick, pose, self._grid) if around_movers and self._ahead.heavy(tick, pose) else []
+            zones = self._ahead.zones(self._grid) if around_movers and self._ahead.heavy else []
             around = functools.partial(self._routes.around, task, self._grid)
-            beside = self._ahead.plan_around_zones(pose, zones, discs, around)
-            plan, discs = beside or self._unless_waiting(tick, pose, trigger, discs, around)
-        if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
-            discs = self._ahead.discs(tick, pose)
+            beside = self._ahead.plan_around_zones(zones, discs, around)
+            plan, discs = beside or self._unless_waiting(pose, trigger, discs, around)
+        if not plan.solved and around_movers and self.blockage.may_pass():
+            discs = self._ahead.discs()
             plan = self._routes.around(task, self._grid, discs)
         route = None
         if plan.solved and len(plan.cells) and not self._routes.plan_error:
@@ -128,18 +123,18 @@ class Replanning(OneRoute):
             self._track(plan, route)
         wall_s = spent()
         if route is None:
-            self.note(now, trigger, wall_s, plan.work)
-            self.blockage.failed(tick, pose)
+            self.note(t, trigger, wall_s, plan.work)
+            self.blockage.failed(pose)
             return None
-        self.note(now, trigger, wall_s, plan.work, plan.cost, route.xy)
+        self.note(t, trigger, wall_s, plan.work, plan.cost, route.xy)
         self.blockage.route_found()
         return self._prepare(route)
 
     def _unless_waiting(
-        self, tick: int, pose: Pose, trigger: str, discs: list[Disc], around: Callable[[list[Disc]], PlanResult]
+        self, pose: Pose, trigger: str, discs: list[Disc], around: Callable[[list[Disc]], PlanResult]
     ) -> tuple[PlanResult, list[Disc]]:
         """Return a plan around discs, and these; without them if waiting is quicker."""
-        plan, asked = around(discs), (tick, pose, trigger, self._routes.robot.max_speed)
+        plan, asked = around(discs), (trigger, self._routes.robot.max_speed)
         straight = math.dist(pose[:2], self._task.goal)
         if plan.solved and self._ahead.waiting_is_quicker(*asked, plan.cost, straight):
             free = around([])
@@ -174,27 +169,27 @@ class CellByCell(Replanning):
     def _may_wait(self) -> bool:  # type: ignore[override]
         return not self._arrived
 
-    def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
+    def trigger(self, now: Moment) -> str:
         """Return `Trigger.DECISION` shortly before the robot reaches its cell, and repeatedly while it waits; else empty."""
-        if tick == 0:
+        if now.tick == 0:
             return Trigger.DECISION
-        since = tick / self._hz - self._replanned_at
+        since, path = now.observed.t - self._replanned_at, now.way.path
         if self._arrived or since < DECISION_PAUSE:
             return ""
         if since >= self.policy.max_wait:  # movers keep the robot from its cell
-            self._note_no_path(tick, pose)
+            self._note_no_path(now)
         if self.blockage.reason:
             return ""
-        return Trigger.DECISION if tracked.length - arc < DECIDE_BEFORE * self._grid.cell else ""
+        return Trigger.DECISION if path.length - now.before.pursuit.arc < DECIDE_BEFORE * self._grid.cell else ""
 
     @compiled()
-    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
+    def replan(self, now: Moment, trigger: str) -> TrackedPath | None:
         """Return the path to the next cell; None if the robot waits."""
         if trigger == Trigger.MISSED:
-            return super().replan(tick, pose, trigger)
-        now, spent = tick / self._hz, clock()
-        self._replanned_at = now
-        covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
+            return super().replan(now, trigger)
+        t, pose, spent = now.observed.t, now.pose, clock()
+        self._replanned_at = t
+        covered = covered_discs(self._movers, np.array([pose[:2]]), 0.0, self._grid)
         with planner_errors(self._routes.planner):
             here, propagated = self._online.cell, self._online.stats.propagated
             to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
@@ -202,37 +197,37 @@ class CellByCell(Replanning):
             self._arrived = bool(self._online.arrived)
         self._routes.plan_error = self._routes.plan_error or check_step(self._query, here, to)
         if self._routes.plan_error:
-            self.note(now, trigger)
+            self.note(t, trigger)
             return None
-        xy = self._line(pose, here, to, tick)
+        xy = self._line(now, here, to)
         if to is not None:
             self.blockage.route_found()
         else:
-            self._note_no_path(tick, pose)
+            self._note_no_path(now)
         if to is not None and bool(np.ptp(xy, axis=0).any()):
-            self.note(now, trigger, spent(), work, polyline_length(xy), xy)
+            self.note(t, trigger, spent(), work, polyline_length(xy), xy)
             return self._prepare(Route(xy))
-        if tick == 0:  # the robot waits in place and must not follow the plan's whole route
+        if now.tick == 0:  # the robot waits in place and must not follow the plan's whole route
             heading = np.array([(0.0, 0.0), (math.cos(pose[2]), math.sin(pose[2]))])
             return self._prepare(Route(np.array(pose[:2]) + 1e-4 * heading))
         return None
 
-    def _note_no_path(self, tick: int, pose: Pose) -> None:
+    def _note_no_path(self, now: Moment) -> None:
         """Record an attempt without progress; log the one at which the robot gives up."""
-        now = tick / self._hz
-        if self.blockage.pause(tick, pose[:2]) or now - self._noted_at < self.policy.min_interval:
+        t = now.observed.t
+        if self.blockage.pause() or t - self._noted_at < self.policy.min_interval:
             return
-        self._noted_at = now
-        self.blockage.failed(tick, pose)
+        self._noted_at = t
+        self.blockage.failed(now.pose)
         if self.blockage.reason:
-            self.note(now, Trigger.DECISION)
+            self.note(t, Trigger.DECISION)
 
-    def _line(self, pose: Pose, here: tuple[int, int], to: tuple[int, int] | None, tick: int) -> Floats:
+    def _line(self, now: Moment, here: tuple[int, int], to: tuple[int, int] | None) -> Floats:
         """Return the line from the robot to the next cell (2 or 3, 2) [m], through the centre of its own cell if necessary."""
-        ends = self._grid.xy(np.array([here, to or here]))
+        pose, ends = now.pose, self._grid.xy(np.array([here, to or here]))
         if to == self._goal and self._clear(ends[0], self._task.goal):
             ends[1] = self._task.goal
-        near = math.dist(pose[:2], ends[0]) <= AT_CELL * self._grid.cell or tick == 0
+        near = math.dist(pose[:2], ends[0]) <= AT_CELL * self._grid.cell or now.tick == 0
         if near and self._clear(pose[:2], ends[1]):
             return np.vstack([pose[:2], ends[1:]])
         return np.vstack([self._way_back(pose, ends[0]), ends[1:]])

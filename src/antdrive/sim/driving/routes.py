@@ -7,7 +7,7 @@ import dataclasses
 from antdrive.base.caches import Keyed, bits, cached
 from antdrive.planners import PlanResult, PlanStatus, TimedPlan, smooth
 from antdrive.robots import TrackedPath
-from antdrive.sim.driving.guide import Follow, RouteGuide, Schedule
+from antdrive.sim.driving.guide import RouteGuide, Schedule
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
 from antdrive.sim.driving.route_planner import RoutePlanner, by_contents
 from antdrive.sim.log.streams import random_stream
@@ -17,8 +17,6 @@ from antdrive.worlds import Grid, Route
 
 class OneRoute(RouteGuide):
     """Guide that keeps the first route. Its grid has no movers; space-time planners get their motions."""
-
-    schedule: Schedule | None = None  # of its timed plan
 
     def first(self) -> tuple[Grid, PlanResult]:
         """Plan from the start; report no path if the start is too narrow to follow it."""
@@ -44,9 +42,6 @@ class OneRoute(RouteGuide):
         route, path = self._prepared(grid, plan)
         self._track(plan, route)
         return route, path
-
-    def _way(self, path: TrackedPath) -> Follow:
-        return Follow(path, self.schedule)
 
     def _track(self, plan: PlanResult, route: Route) -> None:
         """Set the schedule of a new route, among movers of known motions."""

@@ -73,9 +73,8 @@ class ByController:
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the controller's command."""
-        path, observed = now.way.path, now.observed
-        seen = observed._replace(movers=self._movers.near(now.tick, now.pose[:2]))
-        command = self._following.command(seen, path)
+        path = now.way.path
+        command = self._following.command(now.observed._replace(movers=self._movers.near), path)
         turning = abs(command.speed) < STANDING and abs(command.yaw_rate) >= STANDING
         return Step(command, PursuitState(path.nearest(now.pose, now.before.pursuit.arc), turning))
 
@@ -168,7 +167,7 @@ class Avoid:
 
     def apply(self, now: Moment, step: Step) -> Step:
         """Return the command that avoids movers."""
-        avoidance, tick, pose, way, before = self._avoidance, now.tick, now.pose, now.way, now.before
+        avoidance, pose, way, before = self._avoidance, now.pose, now.way, now.before
         last, ahead = before.command, avoidance.prediction_times
         stopping = before.avoids and self._stops_at_goal(pose, last)
         if stopping:
@@ -177,11 +176,10 @@ class Avoid:
             ahead = ahead[: 2 + math.ceil(stopping_time(last, self._robot) / avoidance.step)]
         # The pose is that of the moment when the command takes effect.
         ahead = ahead + self._delay
-        movers, radii = self._movers.predict(tick, pose[:2], ahead)
-        velocities = self._movers.velocities(tick, pose[:2])
-        kept = radii - way.blockage.clearance_reduction(tick, pose[:2]) if way.blockage else radii
+        movers, _, velocities, radii = self._movers.predict(ahead), *self._movers.near[1:]
+        kept = radii - way.blockage.clearance_reduction() if way.blockage else radii
         if self._habits is not None:
-            again, sizes = self._habits.predict(tick, pose[:2], ahead, movers, radii)
+            again, sizes = self._habits.predict(ahead, movers)
             if len(sizes):
                 movers, kept = np.concatenate((movers, again), axis=1), np.concatenate((kept, sizes))
                 velocities = np.concatenate((velocities, (again[1] - again[0]) / avoidance.step))

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,8 +18,6 @@ from antdrive.robots.lidar import Lidar
 from antdrive.robots.noise import Wheels
 from antdrive.robots.spec import Noise, Odometry
 from antdrive.sim.driving.localising import Exact, Fixes, Fused, Reckoned
-from antdrive.sim.driving.parts import Rows
-from antdrive.sim.log.rollout import scans_logged
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import Perception
 from antdrive.sim.sensing.odometer import Odometer
@@ -46,12 +43,16 @@ class Senses:
         pending: the commands that have not reached the motors yet, oldest first
         gyro: errors of odometry with a gyro; None without one
         encoders: the velocity that the encoders measured in the last control period
+        lidar: scans the true world; None: unused
+        movers: tells of movers; None: unused
     """
 
     noisy = False
     pending: Collection[Twist] = ()
     gyro: Odometry | None = None
     encoders = Twist(0.0, 0.0)
+    lidar: SimulatedLidar | None = None
+    movers: MoverSense | None = None
 
     def read(self, state: State) -> tuple[Twist, Pose | None]:
         """Return the velocity by odometry, and a pose fix if one is due. Call once in a control period, before `actuate`."""
@@ -62,42 +63,44 @@ class Senses:
         return command
 
 
-class SlippingSenses(Senses):
-    """Exact poses on slipping wheels."""
+class NoisySenses(Senses):
+    """Slipping wheels with encoders, a gyro if there are errors for one, and pose fixes.
+
+    Args:
+        noise: the levels
+        track: distance between the wheels [m]
+        period: control period [s]
+        seed: the drive's seed
+        gyro: errors of odometry with a gyro; None: no gyro
+        fixes: `noisy`, `exact`, which need no odometry, or `none`
+    """
 
     noisy = True
 
-    def __init__(self, noise: Noise, track: float, period: float, seed: int) -> None:
+    def __init__(
+        self, noise: Noise, track: float, period: float, seed: int, gyro: Odometry | None = None, fixes: str = "noisy"
+    ) -> None:
         self._noise, self._period, self._rng = noise, period, random_stream(seed, "noise")
         self._wheels = Wheels(noise, track, period, self._rng)
-        self.pending = self._wheels.pending
-
-    def actuate(self, command: Twist) -> Twist:
-        """Return the motor targets for a command."""
-        return self._wheels.actuate(command)
-
-
-class NoisySenses(SlippingSenses):
-    """Encoders, with a gyro if there are errors for one, and noisy pose fixes if the robot has any."""
-
-    def __init__(
-        self, noise: Noise, track: float, period: float, seed: int, gyro: Odometry | None = None, *, fixes: bool = True
-    ) -> None:
-        super().__init__(noise, track, period, seed)
-        self.gyro, self._fixes = gyro, fixes
+        self.pending, self.gyro, self._fixes, self._tick = self._wheels.pending, gyro, fixes, 0
         self._odometer = Odometer(gyro, random_stream(seed, "odometry")) if gyro is not None else None
         self._periods_per_fix = max(1, round(1 / (noise.pose_rate * period)))
-        self._tick = 0
 
     def read(self, state: State) -> tuple[Twist, Pose | None]:
         """Return the velocity by odometry, and a pose fix if one is due. Call once in a control period, before `actuate`."""
+        if self._fixes == "exact":
+            return super().read(state)
         self.encoders = odometry = self._wheels.measured(Twist(state.speed, state.yaw_rate))
-        fix = self._fix(state.pose) if self._fixes else None  # draws in every period
+        fix = self._fix(state.pose) if self._fixes == "noisy" else None  # draws in every period
         if self._odometer is not None and self._tick:
             odometry = self._odometer.measured(Twist(self.encoders.speed, state.yaw_rate), self._period)
         due = self._tick % self._periods_per_fix == 0
         self._tick += 1
         return odometry, fix if due else None
+
+    def actuate(self, command: Twist) -> Twist:
+        """Return the motor targets for a command."""
+        return self._wheels.actuate(command)
 
     def _fix(self, pose: Pose) -> Pose:
         levels = self._noise.pose_xy, self._noise.pose_xy, self._noise.pose_yaw
@@ -105,46 +108,44 @@ class NoisySenses(SlippingSenses):
         return x, y, yaw
 
 
-@dataclass(eq=False)
 class SimulatedLidar:
-    """Simulated lidar in the true world."""
+    """Simulated lidar in the true world, with at most one scan per control period.
 
-    scanner: Scanner  # ray casting in the true world
-    world: World  # the static obstacles
-    trajectories: Trajectories | None  # true motions of the movers; None without movers
-    rng: np.random.Generator | None  # source of range noise; None for no noise
-    hz: int  # control periods per second
-    taken: list[tuple[int, Floats]] = field(default_factory=list)  # all scans so far, with their control periods
+    Attributes:
+        taken: all scans so far, with their control periods
 
-    @classmethod
-    def of(
-        cls, lidar: Lidar, world: World, trajectories: Trajectories, *, seed: int, noisy: bool, hz: int
-    ) -> SimulatedLidar:
-        """Create a lidar in a world, with noise from a drive's seed and at most one scan per control period."""
-        rng = random_stream(seed, "lidar") if noisy else None
-        return cls(Scanner.of(lidar.at(hz), world), world, trajectories or None, rng, hz)
+    Args:
+        lidar: the lidar
+        world: the static obstacles
+        trajectories: true motions of the movers
+        hz: control periods per second
+        rng: source of range noise; None: no noise
+    """
+
+    def __init__(
+        self, lidar: Lidar, world: World, trajectories: Trajectories, hz: int, rng: np.random.Generator | None
+    ) -> None:
+        self._scanner, self._world, self._trajectories = Scanner.of(lidar.at(hz), world), world, trajectories
+        self._hz, self._rng = hz, rng
+        self.taken: list[tuple[int, Floats]] = []
 
     def scan(self, tick: int, pose: Pose) -> Floats | None:
         """Return a scan (beams,) [m] from a true pose, if one is due in a control period. The first is due at once."""
-        if self.taken and (tick == self.taken[-1][0] or not self.scanner.lidar.due(tick, self.hz)):
+        if self.taken and (tick == self.taken[-1][0] or not self._scanner.lidar.due(tick, self._hz)):
             return None
-        movers = self.trajectories
-        places = movers.positions(np.array([tick / self.hz]))[0] if movers else None
-        ranges = self.scanner.scan(pose, places, movers.radii if movers else None, self.rng)
+        movers = self._trajectories
+        places = movers.positions(np.array([tick / self._hz]))[0] if movers else None
+        ranges = self._scanner.scan(pose, places, movers.radii if movers else None, self._rng)
         self.taken.append((tick, ranges))
         return ranges
 
     def first(self, start: Pose, radius: float) -> FirstSight:
         """Return what a mapless robot is given at its start, with ground within a radius [m]."""
-        movers, none = self.trajectories, np.empty((0, 3))
-        there = np.column_stack((movers.positions(np.zeros(1))[0], movers.radii)) if movers else none
+        movers = self._trajectories
+        there = np.column_stack((movers.positions(np.zeros(1))[0], movers.radii)) if movers else np.empty((0, 3))
         ranges = self.scan(0, start)
         assert ranges is not None
-        return FirstSight(start_ground(self.world, start[:2], radius, there), ranges)
-
-    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
-        """Return the log's arrays of scans."""
-        return scans_logged(self.taken, per_tick, len(log.t))
+        return FirstSight(start_ground(self._world, start[:2], radius, there), ranges)
 
 
 def start_ground(world: World, place: Point, radius: float, movers: Floats) -> World:
@@ -206,9 +207,9 @@ def positioning(
     levels, errors = robot.noise.scaled(noise), Odometry().scaled(odometry)
     noisy, known = (levels, robot.track, period, seed), (start, period)
     if kind in ("odometry", "matching"):
-        return NoisySenses(*noisy, errors, fixes=False), Reckoned(*known, matched=kind == "matching")
+        return NoisySenses(*noisy, errors, fixes="none"), Reckoned(*known, matched=kind == "matching")
     if kind == "true" or not levels.nonzero:
-        return SlippingSenses(*noisy) if levels.nonzero else Senses(), Exact(*known)
+        return NoisySenses(*noisy, fixes="exact") if levels.nonzero else Senses(), Exact(*known)
     if mapless:
         return NoisySenses(*noisy, errors), Fused(*known, levels, robot.track, errors)
     return NoisySenses(*noisy), Fixes(*known, levels, robot.track)

@@ -32,7 +32,7 @@ class StoppingConstraint:
         robot: RobotSpec,
         hz: int,
         reaction: float,
-        note: Callable[[int, Twist | None, bool], None],
+        note: Callable[[float, Twist | None, bool], None],
     ) -> None:
         self._survey, self._robot, self._period, self._reaction = survey, robot, 1 / hz, reaction
         self._note = note
@@ -42,7 +42,7 @@ class StoppingConstraint:
         command, slowed = self.limit(now.pose, now.before.command, step.command)
         stands = abs(command.speed) < SLOWEST and abs(command.yaw_rate) < SLOWEST
         idle = stands and not (slowed or step.avoids or step.waits)
-        self._note(now.tick, step.command if slowed and stands else None, idle)
+        self._note(now.observed.t, step.command if slowed and stands else None, idle)
         if not slowed:
             return step
         return step._replace(command=command, pursuit=step.pursuit._replace(limiter=SIGHT_LIMIT))
@@ -65,11 +65,11 @@ class StoppingConstraint:
         stop = stopping_time(command, self._robot)
         going = self._reaction + stop / 2  # time at constant speed that covers the stopping distance [s]
         if speed <= ON_THE_SPOT * rate:
-            clear = self._survey.clear_turn(pose, command.yaw_rate, rate * going + SHORT) - SHORT
+            clear = self._survey.clear_way(pose, 0.0, command.yaw_rate, rate * going + SHORT) - SHORT
             seen = clear / rate
         else:
             short = SHORT if speed >= SLOWEST else SHORT * speed / max(speed, rate)
-            seen = (self._survey.clear_distance(pose, *command, speed * going + short) - short) / speed
+            seen = (self._survey.clear_way(pose, *command, speed * going + short) - short) / speed
         if seen >= going * (1 - 1e-12):
             return 1.0
         # The fraction s with s (reaction + s stop / 2) = seen, in a form that keeps all digits where `stop` is short.

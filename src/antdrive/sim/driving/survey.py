@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Point, Pose
-from antdrive.robots import RobotSpec, Twist
+from antdrive.robots import RobotSpec
 from antdrive.robots.control.observation import FirstSight
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.mover_tracking import MAP_CELL, MoverTracking
@@ -29,7 +29,6 @@ PATIENCE = 3  # failed plans in a row before the map is reset
 TOLERANCE = 0.008  # clearance that a route may lose without a replan [m]
 ROUTE_CHECK_STEP = 0.1  # spacing of the points in a route check [m]
 BLUR = 0.02  # additional allowance per metre of distance [m/m]
-SHARPEST = 0.05  # arcs of a smaller radius are treated as turns on the spot [m]
 FAR_AMONG_MOVERS = 15.0  # matching range among movers, which hide near landmarks [m]
 
 
@@ -168,7 +167,7 @@ class Survey(Scans):
             self.whole += 1
             if self._matcher is not None:
                 estimate = self._matched(self._matcher, estimate, ranges, tick)
-        movers = self.tracking.update_on_map(self.map, estimate, ranges, tick) if self.tracking is not None else None
+        movers = self.tracking.read(self.tracking.ground(self.map), estimate, ranges, tick) if self.tracking else None
         self.map.insert(estimate, ranges, movers)
         self.scans.append(Scan(tick, estimate, ranges, movers))
         return estimate
@@ -201,15 +200,9 @@ class Survey(Scans):
         for scan in self.scans[-self._recent :]:
             self.map.insert(scan.estimate, scan.ranges, scan.movers)
 
-    def clear_distance(self, pose: Pose, speed: float, yaw_rate: float, longest: float) -> float:
-        """Return how far the robot can drive on an arc over observed free ground [m]."""
-        return clear_way(self.map, pose, speed, yaw_rate, self._shape, longest)
+    def clear_way(self, pose: Pose, speed: float, yaw_rate: float, longest: float, *, freespace: bool = False) -> float:
+        """Return how far the robot can drive on an arc over observed free ground [m], or turn on the spot [rad].
 
-    def clear_turn(self, pose: Pose, yaw_rate: float, farthest: float) -> float:
-        """Return how far the robot can turn on the spot over observed free ground [rad]."""
-        return clear_way(self.map, pose, 0.0, yaw_rate, self._shape, farthest)
-
-    def clear_way(self, pose: Pose, twist: Twist, farthest: float, *, freespace: bool = False) -> float:
-        """Return how far a twist leads over observed free ground [m], for near turns [rad]; `freespace` opens unknown ground."""
-        speed = 0.0 if abs(twist.speed) <= SHARPEST * abs(twist.yaw_rate) else twist.speed
-        return clear_way(self.map, pose, speed, twist.yaw_rate, self._shape, farthest, freespace=freespace)
+        With `freespace`, unknown ground is open, too.
+        """
+        return clear_way(self.map, pose, speed, yaw_rate, self._shape, longest, freespace=freespace)

@@ -39,14 +39,15 @@ BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good moves less [m]
 
 def stopped(twist: Sequence[float], command: Sequence[float]) -> bool:
     """Return whether the robot stands: neither measured nor commanded to drive or turn."""
-    return all(abs(value) < STOPPED_SPEED for value in (*twist, *command))
+    (speed, turn), (to_speed, to_turn), limit = twist, command, STOPPED_SPEED
+    return abs(speed) < limit and abs(turn) < limit and abs(to_speed) < limit and abs(to_turn) < limit
 
 
 def arrived(
     estimate: Sequence[float], twist: Sequence[float], command: Sequence[float], goal: Point, tolerance: float
 ) -> bool:
     """Return whether a robot with its last command in force stands at the goal by its estimate, which ends its drive."""
-    return stopped(twist, command) and math.dist(estimate[:2], goal) <= tolerance
+    return math.dist(estimate[:2], goal) <= tolerance and stopped(twist, command)
 
 
 def outcome_at(pose: Sequence[float], goal: Point, tolerance: float) -> Outcome:

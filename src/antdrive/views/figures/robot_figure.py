@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 
 from antdrive.base.types import Floats
-from antdrive.robots.card import footprint_text, wheel_thickness
+from antdrive.robots.card import footprint_text
 from antdrive.robots.importing.hull import convex_hull
 from antdrive.robots.spec import RobotSpec
 from antdrive.views.colours import GOAL, INK, MUTED, ROUTE, hexed
@@ -38,7 +38,7 @@ def robot_figure(
         handles.append(axes.add_patch(Polygon(outline, fill=False, ec=hexed(ROUTE), lw=2.0, label="footprint")))
         around = Circle((0, 0), robot.radius, fill=False, ec=hexed(MUTED), lw=1.0, ls="--", label="planning disc")
         handles.append(axes.add_patch(around))
-        thick = wheel_thickness(robot)
+        thick = robot.wheel_thickness
         for side in (1, -1):
             corner = (-robot.wheel_radius, side * robot.track / 2 - thick / 2)
             axes.add_patch(Rectangle(corner, 2 * robot.wheel_radius, thick, fc=hexed(INK), ec="none"))
@@ -48,7 +48,7 @@ def robot_figure(
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         axes.set_xlabel("ahead of the axle [m]")
         axes.set_ylabel("to the left [m]")
-        title = f"{robot.name}: {footprint_text(robot)}".replace("; ", "\n")
+        title = f"{robot.name}: {footprint_text(robot.footprint)}".replace("; ", "\n")
         axes.set_title(title, fontsize=9, loc="left", wrap=True)
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
