@@ -81,19 +81,14 @@ class DynamicWindow:
         top, radius = path.speed_limit(arc), path.tuning.robot_radius
         if not top:
             return Twist(0.0, 0.0), arc
-        discs, bounds, kept = (
-            path.discs_near(now.pose, self.reach + radius),
-            path.obstacles.bounds,
-            radius + self.margin,
-        )
+        kept, bounds = radius + self.margin, path.obstacles.bounds
+        discs = path.discs_near(now.pose, self.reach + radius)
         clear = min(kept, clearance_below(kept, x, y, x, y, discs, bounds) - CLOSER)
-        targets = (path.carrot(now.pose, arc, share * self.lookahead) for share in SIGHTS)
-        target = next(
-            (one for one in targets if clearance_below(kept, x, y, *one, discs, bounds) >= clear), path.pose_at(arc)[:2]
-        )
+        targets = [path.carrot(now.pose, arc, share * self.lookahead) for share in SIGHTS]
+        seen = (one for one in targets if clearance_below(kept, x, y, *one, discs, bounds) >= clear)
+        target = next(seen, targets[-1])
         movers = np.column_stack([now.movers.positions, now.movers.radii])
         tuning = WindowTuning(*(getattr(self, name) for name in WindowTuning._fields))
-        discs = np.vstack([discs, movers])
-        return Twist(
-            *best_velocity(*now.pose, *now.command, top, *target, discs, bounds, kept, path.limits, tuning)
-        ), arc
+        near = np.vstack([discs, movers])
+        best = best_velocity(*now.pose, *now.command, top, *target, near, bounds, kept, path.limits, tuning)
+        return Twist(*best), arc
