@@ -29,11 +29,10 @@ class DynamicWindow:
     `v <= sqrt(2 dist(v, w) a)` and `|w| <= sqrt(2 dist(v, w) / |r| b)`, where `dist` is the length of the arc up to the first
     contact and `r` its radius (equation 14). The best maximises `heading_weight heading + distance_weight dist +
     speed_weight v` (equation 13), each part scaled to [0, 1]; the paper's smoothing of the sum is left out. `heading` is the
-    alignment with the target after the interval and braking. The target is the point of the path at `lookahead`, nearer where
-    an obstacle hides it, so that the approach follows a global plan. The robot counts as a disc, and movers as discs at rest.
+    alignment with the target after the interval and braking. The target is the path's point at `lookahead`, nearer where an
+    obstacle hides it. The robot counts as a disc, and movers as discs at rest.
 
-    Known weaknesses: it cuts corners towards its target, and is hit by fast movers, whose motion it does not predict. On
-    routes for footprints it cannot drive.
+    Known weaknesses: it cuts corners towards its target, and does not predict movers. On routes for footprints it cannot drive.
 
     Attributes:
         interval: time to reach a velocity of the window [s]
@@ -45,7 +44,7 @@ class DynamicWindow:
         margin: distance to keep from obstacles [m]
         speeds: number of speeds in the window
         yaw_rates: number of yaw rates in the window
-        avoids_movers: keep clear of movers alone, as in the paper; otherwise local avoidance changes its commands
+        avoids_movers: avoid movers without local avoidance
 
     Raises:
         FieldError: an option is out of range.
