@@ -150,8 +150,7 @@ class Settings:
     )
     controller: "Controller" = setting(  # noqa: RUF009
         _pursuit,
-        "the controller: a name, FILE.py:CLASS or MODULE:CLASS; in files also {name: NAME} with options, or options of "
-        "pure-pursuit alone",
+        "the controller: a name, FILE.py:CLASS or MODULE:CLASS; in files also {name: NAME} with options",
         "Robot",
         "NAME",
         usual="pure-pursuit",

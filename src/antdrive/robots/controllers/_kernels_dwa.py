@@ -50,7 +50,7 @@ def best_velocity(
             turn = abs(rate)
             if speed * turn > limits.lateral_acceleration:
                 continue
-            free = tuning.reach
+            free = 0.0  # else standing would be worth more than driving towards a near obstacle
             if speed > 0.0:
                 free = free_arc(rate / speed, near, tuning.reach)
                 if speed * speed > 2 * free * a or turn * turn > 2 * free * turn / speed * b:  # equation 14

@@ -29,11 +29,10 @@ class DynamicWindow:
     `v <= sqrt(2 dist(v, w) a)` and `|w| <= sqrt(2 dist(v, w) / |r| b)`, where `dist` is the length of the arc up to the first
     contact and `r` its radius (equation 14). The best maximises `heading_weight heading + distance_weight dist +
     speed_weight v` (equation 13), each part scaled to [0, 1]; the paper's smoothing of the sum is left out. `heading` is the
-    alignment with the target after the interval and braking. The target is the point of the path at `lookahead`, nearer where
-    an obstacle hides it, so that the approach follows a global plan. The robot counts as a disc, and movers as discs at rest.
+    alignment with the target after the interval and braking. The target is the path's point at `lookahead`, nearer where an
+    obstacle hides it. The robot counts as a disc, and movers as discs at rest.
 
-    Known weaknesses: it cuts corners towards its target, and is hit by fast movers, whose motion it does not predict. On
-    routes for footprints it cannot drive.
+    Known weaknesses: it cuts corners towards its target, and does not predict movers. On routes for footprints it cannot drive.
 
     Attributes:
         interval: time to reach a velocity of the window [s]
@@ -45,7 +44,7 @@ class DynamicWindow:
         margin: distance to keep from obstacles [m]
         speeds: number of speeds in the window
         yaw_rates: number of yaw rates in the window
-        avoids_movers: keep clear of movers alone, as in the paper; otherwise local avoidance changes its commands
+        avoids_movers: avoid movers without local avoidance
 
     Raises:
         FieldError: an option is out of range.
@@ -81,19 +80,14 @@ class DynamicWindow:
         top, radius = path.speed_limit(arc), path.tuning.robot_radius
         if not top:
             return Twist(0.0, 0.0), arc
-        discs, bounds, kept = (
-            path.discs_near(now.pose, self.reach + radius),
-            path.obstacles.bounds,
-            radius + self.margin,
-        )
+        kept, bounds = radius + self.margin, path.obstacles.bounds
+        discs = path.discs_near(now.pose, self.reach + radius)
         clear = min(kept, clearance_below(kept, x, y, x, y, discs, bounds) - CLOSER)
-        targets = (path.carrot(now.pose, arc, share * self.lookahead) for share in SIGHTS)
-        target = next(
-            (one for one in targets if clearance_below(kept, x, y, *one, discs, bounds) >= clear), path.pose_at(arc)[:2]
-        )
+        targets = [path.carrot(now.pose, arc, share * self.lookahead) for share in SIGHTS]
+        seen = (one for one in targets if clearance_below(kept, x, y, *one, discs, bounds) >= clear)
+        target = next(seen, targets[-1])
         movers = np.column_stack([now.movers.positions, now.movers.radii])
         tuning = WindowTuning(*(getattr(self, name) for name in WindowTuning._fields))
-        discs = np.vstack([discs, movers])
-        return Twist(
-            *best_velocity(*now.pose, *now.command, top, *target, discs, bounds, kept, path.limits, tuning)
-        ), arc
+        near = np.vstack([discs, movers])
+        best = best_velocity(*now.pose, *now.command, top, *target, near, bounds, kept, path.limits, tuning)
+        return Twist(*best), arc
