@@ -54,6 +54,7 @@ class Session:
         grid: the planning grid
         plan: the planner's answer
         path: the planned path; None if planning found none
+        ended: how the drive ended; None while it goes on
         rollout: the log, once the `with` block is left; None without a path
 
     Args:
@@ -70,6 +71,7 @@ class Session:
         self.briefing = self.mind.briefing
         self.grid, self.plan = guide.first() if planned is None else guide.accept(*planned)
         self.path: TrackedPath | None = None
+        self.ended: Ending | None = None
         self._open = contextlib.ExitStack()
         self._body: Body | None = None
         self.rollout: Rollout | None = None
@@ -77,6 +79,8 @@ class Session:
         if self.plan.solved:
             self._route, self.path = guide.route(self.grid, self.plan)
             self.mind.way = Follow(self.path)
+        else:
+            self.ended = Ending(ENDED_BY[self.plan.status.name], self.plan.reason)
 
     def __enter__(self) -> Session:
         s = self._scenario
@@ -86,6 +90,7 @@ class Session:
             physics = Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories)
             self._plant = Bullet(self._open.enter_context(physics), s.task.start, s.control_hz)
             self._body = Body(self._plant, *self._sensors, hz=s.control_hz, limit=self._limit, task=s.task)
+            self.ended = self._body.ended
         return self
 
     def __exit__(
@@ -96,11 +101,6 @@ class Session:
                 left = Ending(Outcome.STOPPED, error_text(error) if error else "left by the loop that commanded it")
                 ending = self.mind.with_reason(self._body.ended or left, self._body.tick)
                 self.rollout = self._logged(self._body, self._plant.finish(ending))
-
-    @property
-    def ended(self) -> Ending | None:
-        """How the drive ended; None while it goes on."""
-        return self._body.ended if self._body is not None else Ending(ENDED_BY[self.plan.status.name], self.plan.reason)
 
     @property
     def run(self) -> Run:
@@ -128,7 +128,9 @@ class Session:
         """
         if note is SILENT:
             self._by_itself, command = False, command if command is None else Twist(*_finite(command))
-        self._driving("step").step(command, note)
+        body = self._driving("step")
+        body.step(command, note)
+        self.ended = body.ended
 
     def _driving(self, call: str) -> Body:
         if self._body is None:
