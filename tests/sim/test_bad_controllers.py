@@ -336,7 +336,7 @@ def test_a_bad_option_of_a_controller_is_invalid_input(name, value, driven):
     assert said.startswith(f"controller.{name}: ")
 
 
-@pytest.mark.parametrize("action", ACTIONS, ids=str)
+@pytest.mark.parametrize("action", ACTIONS, ids=[str(i) for i in range(len(ACTIONS))])
 def test_a_bad_action_is_named_and_loses_nothing(action, planned):
     s = Scenario.of(TASK, "astar", time_limit=0.5)
     with Session(s, planned) as drive:

@@ -15,7 +15,9 @@ from antdrive.base.progress import progress_bar
 from antdrive.base.version import require_physics, versions
 from antdrive.planners import PlanResult
 from antdrive.robots import Observation, TrackedPath, Twist
+from antdrive.robots.control.controller import within_reach
 from antdrive.robots.control.observation import finite_twist
+from antdrive.robots.control.pursuit import motion_limits
 from antdrive.sim.compose import compose
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.driver import Progress, ignore_progress
@@ -61,6 +63,7 @@ class Session:
         grid: the planning grid
         plan: the planner's answer
         path: the planned path; None if planning found none
+        ended: how the drive ended; None while it goes on
         rollout: the log, once the `with` block is left; None without a path
 
     Args:
@@ -74,9 +77,11 @@ class Session:
     def __init__(self, s: Scenario, planned: tuple[Grid, PlanResult] | None = None) -> None:
         require_physics()
         self._scenario, (self._sensors, guide, self.mind) = s, compose(s)
+        self._limits = motion_limits(s.robot)
         self.briefing = self.mind.briefing
         self.grid, self.plan = guide.first() if planned is None else guide.accept(*planned)
         self.path: TrackedPath | None = None
+        self.ended: Ending | None = None
         self._open = contextlib.ExitStack()
         self._body: Body | None = None
         self.rollout: Rollout | None = None
@@ -84,6 +89,8 @@ class Session:
         if self.plan.solved:
             self._route, self.path = guide.route(self.grid, self.plan)
             self.mind.way = Follow(self.path)
+        else:
+            self.ended = Ending(ENDED_BY[self.plan.status.name], self.plan.reason)
 
     def __enter__(self) -> Session:
         s = self._scenario
@@ -93,6 +100,7 @@ class Session:
             physics = Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=s.trajectories)
             self._plant = Bullet(self._open.enter_context(physics), s.task.start, s.control_hz)
             self._body = Body(self._plant, *self._sensors, hz=s.control_hz, limit=self._limit, task=s.task)
+            self.ended = self._body.ended
         return self
 
     def __exit__(
@@ -103,11 +111,6 @@ class Session:
                 left = Ending(Outcome.STOPPED, error_text(error) if error else "left by the loop that commanded it")
                 ending = self.mind.with_reason(self._body.ended or left, self._body.tick)
                 self.rollout = self._logged(self._body, self._plant.finish(ending))
-
-    @property
-    def ended(self) -> Ending | None:
-        """How the drive ended; None while it goes on."""
-        return self._body.ended if self._body is not None else Ending(ENDED_BY[self.plan.status.name], self.plan.reason)
 
     @property
     def run(self) -> Run:
@@ -138,19 +141,22 @@ class Session:
         """Drive for one control period; without a command, or at the goal, the drive ends where the robot stands.
 
         Args:
-            command: speed [m/s] and yaw rate [rad/s]
+            command: speed [m/s] and yaw rate [rad/s]; the robot comes as close to them as its limits allow
             note: what a mind tells of its command
 
         Raises:
             FieldError: the command is not two finite numbers, or there is no drive.
         """
+        body = self._driving("step")
         if note is SILENT:
             self._by_itself = False
-            if command is not None and (command := finite_twist(given := command)) is None:
-                raise FieldError(
-                    "command", f"must be two finite numbers, a speed and a yaw rate, got {value_text(given, 60)}"
-                )
-        self._driving("step").step(command, note)
+            if command is not None:
+                if (wanted := finite_twist(command)) is None:
+                    problem = f"must be two finite numbers, a speed and a yaw rate, got {value_text(command, 60)}"
+                    raise FieldError("command", problem)
+                command = within_reach(wanted, body.observe().command, self._limits, self.briefing.hz)
+        body.step(command, note)
+        self.ended = body.ended
 
     def _driving(self, call: str) -> Body:
         if self._body is None:

@@ -13,13 +13,13 @@ from antdrive.planners.registry import REGISTRY, registered_name
 from antdrive.robots.robot_file import list_robots
 from antdrive.sim.forms import USUAL_CONTROLLER, name_and_options, require_settings, scenario_fields, written
 from antdrive.sim.log.record import DriveRecord, settings_of
-from antdrive.sim.scenario import Scenario
 from antdrive.sim.settings import SETTINGS
 from antdrive.sim.written import Written, named_planner, named_robot, named_task
 from antdrive.worlds import list_worlds
 
 if TYPE_CHECKING:
     from antdrive.robots import Controller
+    from antdrive.sim.scenario import Scenario
 
 
 def built_in_controller(name: str) -> str | None:
@@ -133,6 +133,7 @@ def rebuilt(
         InputError: the planner or controller cannot be found by its name, or has custom settings.
     """
     from antdrive.robots.controllers.registry import REGISTRY as CONTROLLER_REGISTRY
+    from antdrive.sim.scenario import Scenario
 
     name = record.planner.name if planner is not None else registered_name(record.planner.name)
     made: dict[str, Any] = {"task": record.task, "robot": record.robot, "planner_name": name}

@@ -11,7 +11,7 @@ import numpy as np
 
 from antdrive.base.components import ComponentError, is_built_in
 from antdrive.base.guarded import value_text
-from antdrive.robots.control._kernels_pursuit import reachable_twist
+from antdrive.robots.control._kernels_pursuit import MotionLimits, reachable_twist
 from antdrive.robots.control.observation import Briefing, ControllerCapabilities, Observation, Twist, finite_twist
 from antdrive.robots.control.pursuit import TrackedPath
 
@@ -88,11 +88,9 @@ class Following:
             if path.route is not self._route:
                 self._route, self._state = path.route, self._controller.start(self._briefing, path)
             answer = self._controller.step(now, path, self._state)
-            speed, yaw_rate = self._checked(answer)
+            wanted = self._checked(answer)
             self._state = answer[1]
-        limits = path.limits
-        wanted = min(max(speed, -limits.speed), limits.speed), yaw_rate
-        return Twist(*reachable_twist(*wanted, *now.command, 1 / self._briefing.hz, limits))
+        return within_reach(wanted, now.command, path.limits, self._briefing.hz)
 
     def _own(self, now: Observation, path: TrackedPath) -> tuple[Observation, TrackedPath]:
         """Return copies, which user code may change without effect on anybody else."""
@@ -111,6 +109,12 @@ class Following:
                 return twist
         problem = f"returned {value_text(answer, 60)} instead of {wanted}"
         raise ControllerError(self._name, f"{problem} ({ControllerError.place_of(self._controller)})")
+
+
+def within_reach(wanted: Twist, last: Twist, limits: MotionLimits, hz: int) -> Twist:
+    """Return the command closest to a wanted one that the robot can reach from the last within a control period."""
+    speed = min(max(wanted.speed, -limits.speed), limits.speed)
+    return Twist(*reachable_twist(speed, wanted.yaw_rate, *last, 1 / hz, limits))
 
 
 def _copied(record: Arrays) -> Arrays:

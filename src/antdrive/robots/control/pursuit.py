@@ -182,6 +182,19 @@ class TrackedPath:
         return replace(self, tuning=self.tuning._replace(rotate_above_at_rest=self.tuning.rotate_above))
 
 
+def motion_limits(spec: RobotSpec) -> MotionLimits:
+    """Return the limits of a robot's drive."""
+    return MotionLimits(
+        speed=spec.max_speed,
+        yaw_rate=spec.max_yaw_rate,
+        acceleration=spec.max_acceleration,
+        yaw_acceleration=spec.max_yaw_acceleration,
+        lateral_acceleration=spec.max_lateral_acceleration,
+        half_track=spec.track / 2,
+        rim_speed=spec.max_wheel_speed * spec.wheel_radius,
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class PurePursuit:
     """Pure pursuit whose lookahead keeps clear of obstacles; routes for footprints are lines and turns on the spot.
@@ -278,16 +291,7 @@ class PurePursuit:
             else obstacles_around(route.xy[0], world.discs, world.bounds)
         )
         samples = self._samples(route, world, spec, obstacles, tuning)
-        limits = MotionLimits(
-            speed=spec.max_speed,
-            yaw_rate=spec.max_yaw_rate,
-            acceleration=spec.max_acceleration,
-            yaw_acceleration=spec.max_yaw_acceleration,
-            lateral_acceleration=spec.max_lateral_acceleration,
-            half_track=spec.track / 2,
-            rim_speed=spec.max_wheel_speed * spec.wheel_radius,
-        )
-        return TrackedPath(route, tuning.goal_distance, samples, obstacles, limits, tuning)
+        return TrackedPath(route, tuning.goal_distance, samples, obstacles, motion_limits(spec), tuning)
 
     @property
     def capabilities(self) -> ControllerCapabilities:

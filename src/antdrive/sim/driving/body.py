@@ -60,7 +60,8 @@ class Body:
         self._command = Twist(0.0, 0.0)  # in force
         self._now: Observation | None = None
         self.tick = 0
-        self.ended = Ending(Outcome.COLLIDED) if plant.touched else self._timed_out()
+        late = None if self._periods else Ending(Outcome.TIMED_OUT)
+        self.ended = Ending(Outcome.COLLIDED) if plant.touched else late
 
     def observe(self) -> Observation:
         """Return what the robot observes in this control period."""
@@ -75,10 +76,13 @@ class Body:
 
     def step(self, command: Twist | None, note: Note = SILENT) -> None:
         """Drive for one control period; without a command, or at the goal, the drive ends where the robot stands."""
-        now = self._now or self.observe()
+        now, task = self._now or self.observe(), self._task
         believed = self._localiser.pose = note.pose or now.pose
         self.estimates.append(believed)
-        if (command is None and note.ending is None) or self._arrived(believed, now.twist):
+        stays = command is None and note.ending is None
+        if task is not None and self.tick and not stays:  # once it has had a command
+            stays = arrived(believed, now.twist, self._command, task.goal, task.goal_tolerance)
+        if stays:
             self.ended = self._judged(believed)
             return
         if command is None:
@@ -89,7 +93,8 @@ class Body:
         self.ended = Ending(Outcome.COLLIDED) if self._plant.touched else note.ending
         if self.ended is None:
             self.tick += 1
-            self.ended = self._timed_out()
+            if self.tick >= self._periods:
+                self.ended = Ending(Outcome.TIMED_OUT)
 
     def logged(self, log: Drive, per_tick: int) -> dict[str, Any]:
         """Return the scans, and for a robot with noise the estimates and the motor targets.
@@ -108,16 +113,6 @@ class Body:
         ]
         period = np.minimum(np.arange(len(log.t)) // per_tick, max(len(errors) - 1, 0))
         return scans | {"estimate": log.pose + np.array(errors or [(0.0, 0.0, 0.0)])[period], "actuated": log.actuated}
-
-    def _arrived(self, believed: Pose, twist: Twist) -> bool:
-        """Return whether the robot stands at the goal by its estimate, once it has had a command."""
-        task = self._task
-        if task is None or not self.tick:
-            return False
-        return arrived(believed, twist, self._command, task.goal, task.goal_tolerance)
-
-    def _timed_out(self) -> Ending | None:
-        return Ending(Outcome.TIMED_OUT) if self.tick >= self._periods else None
 
     def _judged(self, believed: Pose) -> Ending:
         """Return the ending of a robot that stands without contact and believes to be at a pose."""

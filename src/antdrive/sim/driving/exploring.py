@@ -255,7 +255,7 @@ class Exploration(RouteGuide):
     # ---- the driver's queries
 
     def _way(self, path: TrackedPath) -> Follow:
-        return Wait(path, scan_turn=self.recovery.scan_turn) if self._may_wait else Follow(path)
+        return Wait(path, scan_turn=self.recovery.scan_turn) if self._may_wait else super()._way(path)
 
     def _refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
         if self._indexed == self.survey.whole:
