@@ -1,6 +1,6 @@
 """PPO that learns among BARN-like worlds on the kinematic plant, and drives BARN's own worlds in physics.
 
-    python examples/train_ppo.py train policy.zip                       # at most 15 minutes of one core
+    python examples/train_ppo.py train policy.zip                       # about 15 minutes of one core
     python examples/train_ppo.py drive policy.zip BARN drives.csv       # 50 worlds x 10 seeds; continues where it ended
     python examples/train_ppo.py table drives.csv
 

@@ -53,7 +53,7 @@ def best_velocity(
             free = 0.0  # else standing would be worth more than driving towards a near obstacle
             if speed > 0.0:
                 free = free_arc(rate / speed, near, tuning.reach)
-                if speed * speed > 2 * free * a or turn * turn > 2 * free * turn / speed * b:  # equation 14
+                if speed * speed > 2 * free * a or turn * turn > 2 * free * turn / speed * b:  # it cannot stop in time
                     continue
             length, turned = speed * t + speed * speed / (2 * a), rate * t + rate * turn / (2 * b)
             chord = length * math.sin(turned / 2) / (turned / 2) if abs(turned) > STRAIGHT else length
@@ -64,7 +64,7 @@ def best_velocity(
                 tuning.heading_weight * aligned
                 + tuning.distance_weight * free / tuning.reach
                 + tuning.speed_weight * speed / limits.speed
-            )  # equation 13
+            )
             if worth > best:
                 best, best_v, best_w = worth, speed, rate
     return best_v, best_w

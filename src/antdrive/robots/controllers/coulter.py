@@ -30,7 +30,7 @@ class Coulter:
     """Plain pure pursuit: the arc to a point of the path at a fixed lookahead.
 
     With the carrot at (x, y) in the robot's frame and at distance L, the arc through both has the curvature
-    `k = 2 y / L^2` (Coulter 1992, section 2). The paper assumes a vehicle that already faces along the path; here a robot turns
+    `k = 2 y / L^2`. The paper assumes a vehicle that already faces along the path; here a robot turns
     on the spot while the carrot is more than `turn_above` to its side. The speed is that of `TrackedPath.speed_limit`.
 
     Known weaknesses: it cuts corners by up to the lookahead, knows no obstacles, and weaves where the lookahead is short for

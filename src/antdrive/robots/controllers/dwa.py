@@ -27,8 +27,8 @@ class DynamicWindow:
 
     The window holds the velocities (v, w) that the robot reaches within `interval`. Admissible are those with
     `v <= sqrt(2 dist(v, w) a)` and `|w| <= sqrt(2 dist(v, w) / |r| b)`, where `dist` is the length of the arc up to the first
-    contact and `r` its radius (equation 14). The best maximises `heading_weight heading + distance_weight dist +
-    speed_weight v` (equation 13), each part scaled to [0, 1]; the paper's smoothing of the sum is left out. `heading` is the
+    contact and `r` its radius. The best maximises `heading_weight heading + distance_weight dist +
+    speed_weight v`, each part scaled to [0, 1]; the paper's smoothing of the sum is left out. `heading` is the
     alignment with the target after the interval and braking. The target is the path's point at `lookahead`, nearer where an
     obstacle hides it. The robot counts as a disc, and movers as discs at rest.
 

@@ -1,6 +1,6 @@
 """Steering of the robot Stanley.
 
-S. Thrun et al., *Stanley: The robot that won the DARPA Grand Challenge*, Journal of Field Robotics 23(9), 2006, section 9.2.
+S. Thrun et al., *Stanley: The robot that won the DARPA Grand Challenge*, Journal of Field Robotics 23(9), 2006.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from antdrive.robots.controllers.coulter import turn_on_spot
 class Stanley:
     """Stanley's steering: heading error plus the arctangent of the cross-track error.
 
-    Equation 5 of the paper: `delta = psi + arctan(k e / u)` with the path's heading `psi` relative to the vehicle, the
+    The law: `delta = psi + arctan(k e / u)` with the path's heading `psi` relative to the vehicle, the
     cross-track error `e` of the front axle and the speed `u`. A differential drive steers as a vehicle of a virtual wheelbase
     `L` whose rear axle is the robot's: its yaw rate is `u tan(delta) / L`. `softening` is added to the speed, so that a slow
     robot does not steer hard. A robot that faces away from the path by more than `turn_above` turns on the spot. The speed
