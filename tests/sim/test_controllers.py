@@ -343,3 +343,25 @@ def test_a_briefing_holds_neither_movers_nor_unseen_obstacles():
     run(Scenario.of("people-crossing", "astar", controller=Reading(), unseen=(Disc(1.0, 1.0, 0.05),), time_limit=0.2))
     assert not given[0].movers
     assert Disc(1.0, 1.0, 0.05) not in given[0].obstacles
+
+
+@pytest.mark.parametrize("name", ["PurePursuit", "dwa", "Session"])
+def test_a_class_with_the_name_of_a_built_in_controller_is_refused(name, folder):
+    (folder / "named.py").write_text(f"{FOLLOWER}\n\nclass {name}(Proportional):\n    pass\n")
+    with pytest.raises(InputError, match="rename the class"):
+        scenario(f"named.py:{name}")
+
+
+def test_what_a_controller_remembers_about_itself_stays_in_its_drive():
+    class Counting:
+        steps = 0
+
+        def start(self, briefing, path):
+            return None
+
+        def step(self, now, path, state):
+            self.steps += 1
+            return Twist(0.1 * (self.steps % 3), 0.0), None
+
+    s = scenario(Counting(), time_limit=0.5)
+    assert run(s).rollout.digest == run(s).rollout.digest

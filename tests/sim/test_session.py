@@ -47,7 +47,7 @@ def test_a_drive_commanded_from_outside_is_logged_and_certified(scenario, tmp_pa
     done.rollout.save(tmp_path / "log.npz")
     again = Rollout.load(tmp_path / "log.npz")
     assert not certify(again).problems
-    with pytest.raises((FieldError, InputError), match="Session"):
+    with pytest.raises((FieldError, InputError), match="a loop of its own"):
         rerun(again)
 
 
@@ -119,3 +119,62 @@ def test_a_session_without_a_path_ends_before_it_begins(scenario):
         with pytest.raises(FieldError, match="no path"):
             drive.observe()
     assert (drive.run.outcome, drive.rollout) == (Outcome.NO_PATH, None)
+
+
+@pytest.mark.parametrize("periods", [0, 30])
+def test_a_loop_that_stops_off_the_goal_logs_it(scenario, periods):
+    with Session(scenario) as drive:
+        for _ in range(periods):
+            drive.step(Twist(0.3, 0.0))
+        drive.step(None)
+    assert drive.run.outcome is Outcome.STOPPED
+    assert not certify(drive.rollout).problems
+
+
+def test_commands_of_mind_and_loop_mix_within_the_robots_limits(scenario):
+    with Session(scenario) as drive:
+        while not drive.ended:
+            command, note = drive.mind.act(drive.observe())
+            if drive.observe().tick % 40 < 3:
+                drive.step(Twist(-9.0, 50.0))
+            else:
+                drive.step(command, note)
+    assert not certify(drive.rollout).problems
+    assert drive.rollout.record.controller.name == "Session"
+
+
+def test_a_note_belongs_to_its_command(scenario):
+    with Session(scenario) as drive:
+        command, note = drive.mind.act(drive.observe())
+        for given in (Twist(math.nan, 0.0), Twist(command.speed / 2, 0.0)):
+            with pytest.raises(FieldError, match="note: belongs to another command"):
+                drive.step(given, note)
+        with pytest.raises(FieldError, match="note: is not the one"):
+            drive.step(command, note._replace(limiter=99))
+
+
+def test_a_drive_by_its_mind_that_is_left_early_repeats(scenario):
+    with Session(scenario) as drive:
+        for _ in range(50):
+            drive.step(*drive.mind.act(drive.observe()))
+    assert rerun(drive.rollout).digest == drive.rollout.digest
+
+
+def test_no_sense_tells_the_true_velocity_of_noisy_wheels(scenario):
+    with Session(dataclasses.replace(scenario, noise=1.0)) as drive:
+        off = []
+        for _ in range(60):
+            before, now = drive.true_pose, drive.observe()
+            drive.step(Twist(0.3, 0.0))
+            off.append(abs(now.twist.speed - math.dist(before[:2], drive.true_pose[:2]) * 60))
+    assert max(off[30:]) > 1e-3
+
+
+def test_a_session_is_driven_once_and_has_its_run_afterwards(scenario):
+    drive = Session(scenario)
+    with drive:
+        with pytest.raises(FieldError, match="leave the `with` block"):
+            _ = drive.run
+        drive.step(Twist(0.1, 0.0))
+    with pytest.raises(FieldError, match="create another"):
+        drive.__enter__()

@@ -48,6 +48,7 @@ class Registry(Generic[Component]):
         unfit: returns what an object lacks to be one, as "no method plan(query, rng); write one"; empty if it is one
         calls: the number of arguments of each method
         base: a class whose subclasses must make all their options fields
+        reserved: names in records that no class may have
     """
 
     error: type[ComponentError]
@@ -56,6 +57,7 @@ class Registry(Generic[Component]):
     unfit: Callable[[Any], str]
     calls: Mapping[str, tuple[str, ...]]
     base: type = object
+    reserved: tuple[str, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -76,6 +78,7 @@ class Registry(Generic[Component]):
         """
         if is_user_code(name):
             made = self._instance(user_object(name, home, self.error), f"{self.kind} {name!r}")
+            self._require_own_name(record_name(name), type(made).__module__)
         elif name in self.known():
             made = self.known()[name]
         elif (entry := self._plugins().get(name)) is not None:
@@ -83,6 +86,16 @@ class Registry(Generic[Component]):
         else:
             raise _error(self.kind, _unknown(name, [*self.known(), *self._plugins()], self.kind))
         return self._with_options(name, made, options)
+
+    def _require_own_name(self, name: str, module: str) -> None:
+        """Refuse a class of user code whose name in records is that of something else."""
+        known = self.known()
+        if not module.startswith("antdrive.") and name in {
+            *known,
+            *self.reserved,
+            *(type(one).__name__ for one in known.values()),
+        }:
+            raise _error(self.kind, f"{name!r} is the name of a built-in {self.kind}; rename the class")
 
     def recorded(self, name: str, /, **options: Any) -> Component:
         """Return the component with a name in a record: one of user code that this process has loaded, or a registered one."""

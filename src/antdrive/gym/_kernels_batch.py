@@ -25,7 +25,20 @@ LEAP = 20.0  # a mover that is faster has jumped [m/s]; worlds/limits.py has the
 DRIVING, SUCCEEDED, STUCK, COLLIDED, HIT_WHILE_STANDING, HIT_BY_TELEPORT = 0, 1, 2, 3, 4, 5
 # Columns of `Robots.state`: true pose and twist, command in force, estimated pose, slip of both wheels, and a lower bound
 # of the distance to anything static.
-X, Y, YAW, SPEED, TURN, TO_SPEED, TO_TURN, BELIEVED, SLIP, FREE, COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 10, 12, 13
+X, Y, YAW, SPEED, TURN, TO_SPEED, TO_TURN, BELIEVED, SLIP, FREE, MEASURED, COLUMNS = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    10,
+    12,
+    13,
+    15,
+)
 # Columns of `Robots.facts`.
 CLEARANCE, DISTANCE, PROGRESS = 0, 1, 2
 
@@ -236,16 +249,19 @@ def measure(i: int, shared: SharedSpec, robots: Robots) -> None:
     if not (noise[0] > 0.0 or noise[1] > 0.0 or noise[2] > 0.0 or noise[3] > 0.0):
         for k in range(3):
             state[BELIEVED + k] = state[X + k]
+        state[MEASURED], state[MEASURED + 1] = state[SPEED], state[TURN]
         return
     rim = state[TURN] * half_track
     left = (state[SPEED] - rim) / (1.0 + state[SLIP]) * (1.0 + noise[2] * normal(i, robots.random))
     right = (state[SPEED] + rim) / (1.0 + state[SLIP + 1]) * (1.0 + noise[2] * normal(i, robots.random))
+    speed, turn = (left + right) / 2.0, (right - left) / (2.0 * half_track)
+    state[MEASURED], state[MEASURED + 1] = speed, turn
     fix_x = state[X] + noise[0] * normal(i, robots.random)
     fix_y = state[Y] + noise[0] * normal(i, robots.random)
     fix_yaw = state[YAW] + noise[1] * normal(i, robots.random)
     x, y, yaw = state[BELIEVED], state[BELIEVED + 1], state[BELIEVED + 2]
     if robots.tick[i] > 0:
-        x, y, yaw = moved(x, y, yaw, (left + right) / 2.0, (right - left) / (2.0 * half_track), period)
+        x, y, yaw = moved(x, y, yaw, speed, turn, period)
     if robots.tick[i] % robots.timing[i, 1] == 0:
         x, y = x + noise[4] * (fix_x - x), y + noise[4] * (fix_y - y)
         turned = fix_yaw - yaw
@@ -316,8 +332,8 @@ def see(i: int, shared: SharedSpec, robots: Robots) -> None:
     bearing = math.atan2(away_y, away_x) - yaw
     seen[count] = min(math.hypot(away_x, away_y) / FARTHEST, 1.0)
     seen[count + 1], seen[count + 2] = math.cos(bearing), math.sin(bearing)
-    seen[count + 3] = min(max(state[SPEED] / limits[0], -1.0), 1.0)
-    seen[count + 4] = min(max(state[TURN] / limits[1], -1.0), 1.0)
+    seen[count + 3] = min(max(state[MEASURED] / limits[0], -1.0), 1.0)
+    seen[count + 4] = min(max(state[MEASURED + 1] / limits[1], -1.0), 1.0)
 
 
 @leaf

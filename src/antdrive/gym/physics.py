@@ -46,10 +46,8 @@ class PhysicsPlant(KinematicPlant):
             for _ in range(CONTROL_HZ // ACTION_HZ):
                 kernels.decide(i, float(actions[i, 0]), float(actions[i, 1]), self._shared, robots)
                 drive.step(Twist(*robots.state[i, kernels.TO_SPEED : kernels.TO_TURN + 1].tolist()))
-                if not drive.ended:
-                    self._observe(i)
-                    if kernels.arrived(i, robots) != kernels.DRIVING:
-                        drive.step(None)  # the referee judges where it stands
+                if not drive.ended and self._observe(i) and kernels.arrived(i, robots) != kernels.DRIVING:
+                    drive.step(None)  # the referee judges where it stands
                 if drive.ended:
                     break
             self._note(i)
@@ -75,16 +73,18 @@ class PhysicsPlant(KinematicPlant):
         self.leave(i)
         return self._results.pop(i)
 
-    def _observe(self, i: int) -> None:
-        """Note what robot i observes in this control period."""
+    def _observe(self, i: int) -> bool:
+        """Note what robot i observes in this control period; return whether it stands."""
         now, state, robots = self._drives[i].observe(), self.robots.state[i], self.robots
         robots.tick[i], robots.timing[i, 0] = now.tick, len(now.pending)
         state[kernels.BELIEVED : kernels.BELIEVED + 3] = now.pose
-        state[kernels.SPEED], state[kernels.TURN] = now.twist
+        state[kernels.MEASURED : kernels.MEASURED + 2] = now.twist
+        state[kernels.SPEED], state[kernels.TURN] = Twist(0.0, 0.0) if now.standing else now.twist
         if now.scan is not None:
             robots.seen[i, : len(now.scan)] = np.clip(now.scan / self._shared.ranges[1], 0.0, 1.0)
         for k, command in enumerate(now.pending):
             robots.pending[i, (now.tick + k) % len(now.pending)] = command
+        return now.standing
 
     def _note(self, i: int) -> None:
         """Write the observation of robot i, and what is true, for rewards and infos alone."""

@@ -85,8 +85,8 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         render_mode: str | None = None,
     ) -> None:
         for key, value in (("num_envs", num_envs), ("steps", steps)):
-            if value < 1:
-                raise InputError(f"{key}: must be at least 1, got {value}")
+            if not isinstance(value, int) or value < 1:
+                raise InputError(f"{key}: must be a whole number of at least 1, got {value!r:.60}")
         if render_mode not in (None, "rgb_array"):
             raise InputError(f"render_mode: must be rgb_array or None, got {render_mode!r}")
         self.metadata = METADATA | {"autoreset_mode": AutoresetMode(autoreset_mode)}
@@ -127,12 +127,16 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
         if chosen.shape != (self.num_envs,) or chosen.dtype != np.bool_:
             raise InputError(f"options: reset_mask must be {self.num_envs} booleans")
         count = self.num_envs
-        seeds = seed if isinstance(seed, Sequence) else [None if seed is None else seed + i for i in range(count)]
+        seeds = (
+            seed
+            if isinstance(seed, Sequence | np.ndarray)
+            else [None if seed is None else seed + i for i in range(count)]
+        )
         if len(seeds) != self.num_envs:
             raise InputError(f"seed: must be one for each of {self.num_envs} robots, got {len(seeds)}")
         for i in range(self.num_envs):
             if self.rngs[i] is None or (seeds[i] is not None and chosen[i]):
-                self.rngs[i] = seeding.np_random(seeds[i])[0]
+                self.rngs[i] = seeding.np_random(None if (one := seeds[i]) is None else int(one))[0]
             if chosen[i]:
                 self._begin(i, options)
         return self._observation(), self._info(chosen)
@@ -155,7 +159,7 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
             raise InputError(f"actions: must be finite numbers of shape ({self.num_envs}, 2), got {actions!r:.100}")
         mode, fresh = self.metadata["autoreset_mode"], self._over
         if self.rngs[0] is None or (mode is AutoresetMode.DISABLED and fresh.any()):
-            raise ResetNeeded("call reset first: an episode has ended")
+            raise ResetNeeded("call reset first: an episode has not begun or has ended")
         chosen, robots = ~fresh, self._plant.robots
         np.clip(wanted, -1.0, 1.0, out=wanted)
         self._plant.drive(chosen, wanted)
@@ -223,8 +227,8 @@ class NavigationVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _factor(self, noise: Any) -> float:
         try:
-            require_factors(self._robot, noise, 0.0)
             require("noise", noise, at_least=0.0)
+            require_factors(self._robot, noise, 0.0)
         except FieldError as error:
             raise error.as_input() from None
         except TypeError:

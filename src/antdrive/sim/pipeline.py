@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from antdrive.base import Pose
 from antdrive.base.errors import FieldError
-from antdrive.base.guarded import error_text, value_text
+from antdrive.base.guarded import error_text, one_line, value_text
 from antdrive.base.progress import progress_bar
 from antdrive.base.version import require_physics, versions
 from antdrive.planners import PlanResult
@@ -94,6 +95,8 @@ class Session:
 
     def __enter__(self) -> Session:
         s = self._scenario
+        if self._body is not None:
+            raise FieldError("session", "has been driven; create another")
         self._started = time.perf_counter()
         if self.path is not None:
             self._limit = s.time_limit or s.task.time_limit or usual_time_limit(self._route.length, s.robot, s.noise)
@@ -108,14 +111,22 @@ class Session:
     ) -> None:
         with self._open:
             if self._body is not None:
-                left = Ending(Outcome.STOPPED, error_text(error) if error else "left by the loop that commanded it")
+                left = Ending(
+                    Outcome.STOPPED, one_line(error_text(error)) if error else "left by the loop that commanded it"
+                )
                 ending = self.mind.with_reason(self._body.ended or left, self._body.tick)
                 self.rollout = self._logged(self._body, self._plant.finish(ending))
 
     @property
     def run(self) -> Run:
-        """The result, with its log and certificate, once the `with` block is left."""
+        """The result, with its log and certificate, once the `with` block is left.
+
+        Raises:
+            FieldError: it has not been left.
+        """
         log = self.rollout
+        if log is None and self.path is not None:
+            raise FieldError("run", "leave the `with` block first")
         return Run(self._scenario, self.grid, self.plan, log, None if log is None else certify(log))
 
     @property
@@ -142,21 +153,33 @@ class Session:
 
         Args:
             command: speed [m/s] and yaw rate [rad/s]; the robot comes as close to them as its limits allow
-            note: what a mind tells of its command
+            note: what the mind tells of its command
 
         Raises:
             FieldError: the command is not two finite numbers, or there is no drive.
         """
         body = self._driving("step")
-        if note is SILENT:
-            self._by_itself = False
-            if command is not None:
-                if (wanted := finite_twist(command)) is None:
-                    problem = f"must be two finite numbers, a speed and a yaw rate, got {value_text(command, 60)}"
-                    raise FieldError("command", problem)
-                command = within_reach(wanted, body.observe().command, self._limits, self.briefing.hz)
+        if note is SILENT or command is not self.mind.last[0]:
+            command, note = self._own(command, note, body.observe())
+        elif note is not self.mind.last[1]:
+            raise FieldError("note", "is not the one of the mind's command")
         body.step(command, note)
         self.ended = body.ended
+
+    def _own(self, command: Twist | None, note: Note, now: Observation) -> tuple[Twist | None, Note]:
+        """Return a command from outside within the robot's limits, and a note on it."""
+        if note is not SILENT:
+            raise FieldError("note", "belongs to another command; leave it out")
+        self._by_itself, goal, tolerance = False, self.briefing.goal, self.briefing.tolerance
+        if command is None:
+            there = now.standing and math.dist(now.pose[:2], goal) <= tolerance
+            return None, SILENT if there else Note(
+                ending=Ending(Outcome.STOPPED, "stopped by the loop that commanded it")
+            )
+        if (wanted := finite_twist(command)) is None:
+            problem = f"must be two finite numbers, a speed and a yaw rate, got {value_text(command, 60)}"
+            raise FieldError("command", problem)
+        return within_reach(wanted, now.command, self._limits, self.briefing.hz), note
 
     def _driving(self, call: str) -> Body:
         if self._body is None:
@@ -233,11 +256,15 @@ def run(
 
 
 def driven(
-    s: Scenario, planned: tuple[Grid, PlanResult] | None = None, progress: Progress = ignore_progress
+    s: Scenario,
+    planned: tuple[Grid, PlanResult] | None = None,
+    progress: Progress = ignore_progress,
+    periods: float = math.inf,
 ) -> tuple[Grid, PlanResult, Rollout | None]:
-    """Plan and drive as `run` does; return the grid, the plan, and the log if there is a path."""
+    """Plan and drive as `run` does, for a number of control periods; return grid and plan, and the log if there is a path."""
     with Session(s, planned) as drive:
         drive.mind.progress = progress
-        while not drive.ended:
+        while not drive.ended and periods > 0:
             drive.step(*drive.mind.act(drive.observe()))
+            periods -= 1
     return drive.grid, drive.plan, drive.rollout

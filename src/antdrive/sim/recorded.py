@@ -12,7 +12,7 @@ from antdrive.planners import PLANNERS, Planner, load_planner
 from antdrive.planners.registry import REGISTRY, registered_name
 from antdrive.robots.robot_file import list_robots
 from antdrive.sim.forms import USUAL_CONTROLLER, name_and_options, require_settings, scenario_fields, written
-from antdrive.sim.log.record import DriveRecord, settings_of
+from antdrive.sim.log.record import FROM_OUTSIDE, DriveRecord, settings_of
 from antdrive.sim.settings import SETTINGS
 from antdrive.sim.written import Written, named_planner, named_robot, named_task
 from antdrive.worlds import list_worlds
@@ -102,6 +102,8 @@ def _contradicted_settings(record: DriveRecord, words: Written) -> Iterator[str]
     if words.planner in PLANNERS:
         options = settings_of(load_planner(words.planner, **options))
     yield from (f"planner.{key}" for key, value in record.planner.settings.items() if options.get(key, value) != value)
+    if record.controller.name == FROM_OUTSIDE:
+        return
     if built_in_controller(record.controller.name) is None or is_user_code(controller_name(settings)):
         if record_name(controller_name(settings)) != record.controller.name:
             yield "controller"
@@ -138,8 +140,11 @@ def rebuilt(
     name = record.planner.name if planner is not None else registered_name(record.planner.name)
     made: dict[str, Any] = {"task": record.task, "robot": record.robot, "planner_name": name}
     made["planner"] = REGISTRY.of_record(record.planner.name, record.planner.settings, planner)
-    made["controller"] = CONTROLLER_REGISTRY.of_record(record.controller.name, record.controller.settings, controller)
+    if record.controller.name == FROM_OUTSIDE:
+        raise InputError("record.controller: a loop of its own commanded this drive, so only that loop can repeat it")
     try:
+        known = record.controller
+        made["controller"] = CONTROLLER_REGISTRY.of_record(known.name, known.settings, controller)
         settings = _settings_in_force(record)
     except (FieldError, InputError) as error:
         raise InputError(str(FieldError(error.key, error.problem).under("record"))) from None

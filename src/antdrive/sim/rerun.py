@@ -26,6 +26,7 @@ from antdrive.base.types import Floats
 from antdrive.base.version import versions
 from antdrive.planners import Planner, PlanResult, TimedPlan, is_built_in
 from antdrive.robots import Controller
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import PROOFS, Proof, plain_value
 from antdrive.sim.log.rollout import FORMS, NOISY, ROWS, Rollout
 from antdrive.sim.pipeline import driven, plan
@@ -36,7 +37,7 @@ ROUNDING = 1e-3  # tolerance of a rerun on another machine or version [m], [rad]
 SAME_NOISE = 1e-6  # the same of estimates and motor targets where the rerun repeats the motion bit for bit
 LONGER = 1.0  # a rerun may outlast its log by this time [s]
 LONGEST = 60  # characters of a value in a message
-UNSTEADY = "the planner gives another plan for the same seed; draw random numbers from rng only"
+UNSTEADY = "own code gives another run for the same seed; draw random numbers from a planner's rng only"
 
 
 @dataclass(frozen=True)
@@ -217,11 +218,15 @@ def rerun_scenario(
 def _driven(s: Scenario, rollout: Rollout) -> tuple[PlanResult, Rollout]:
     """Return the plan and the drive of a log's scenario."""
     record = rollout.record
-    _, answer, again = driven(s)
+    stopped = rollout.outcome is Outcome.STOPPED  # by a loop that left its session early, for reasons of its own
+    periods = (len(rollout.t) - 1) * record.control_hz // record.physics_hz if stopped else math.inf
+    _, answer, again = driven(s, periods=periods)
     if again is None:
         raise FieldError("cells", f"planning again ends with {answer.status.name.lower()}: {answer.reason}")
     # The digest covers claims as well, and the shorter time limit is not the record's.
     kept = dataclasses.replace(again.record, digest=record.digest, time_limit=record.time_limit)
+    if stopped:
+        kept = dataclasses.replace(kept, reason=record.reason)
     return answer, dataclasses.replace(again, record=kept)
 
 

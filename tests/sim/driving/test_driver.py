@@ -69,7 +69,7 @@ def driver(robot, guide=None, *rules):
 
 def seen(tick=0, pose=TASK.start, speed=0.0):
     """What a robot without errors observes."""
-    return Observation(tick, tick / 60, pose, Twist(speed, 0.0))
+    return Observation(tick, tick / 60, pose, Twist(speed, 0.0), standing=abs(speed) < 0.01)
 
 
 class Off(Senses):

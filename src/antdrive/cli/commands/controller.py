@@ -18,9 +18,10 @@ def controller(
 ) -> None:
     """List the options of pure pursuit, or describe controllers with theirs."""
     from antdrive.base.registry import describe, options_card
-    from antdrive.robots import load_controller
+    from antdrive.robots import list_controllers, load_controller
     from antdrive.robots.control.nav2 import NAV2
     from antdrive.robots.control.pursuit import controller_options
+    from antdrive.sim.forms import USUAL_CONTROLLER
 
     if nav2:
         show(json, dict(NAV2), table(("Nav2's Regulated Pure Pursuit", "antdrive"), NAV2.items()))
@@ -36,4 +37,5 @@ def controller(
         for name, one in known.items()
     }
     rows = ((name, f"{one.default:g} {one.unit}".strip(), one.routes, one.meaning) for name, one in known.items())
-    show(json, facts, table(("option", "default", "routes", "meaning"), rows))
+    others = ", ".join(name for name in list_controllers() if name != USUAL_CONTROLLER)
+    show(json, facts, [*table(("option", "default", "routes", "meaning"), rows), f"others, by name: {others}"])

@@ -65,8 +65,9 @@ class Following:
     """A controller on the paths of a drive: its state, and checks of its commands."""
 
     def __init__(self, controller: Controller, name: str, briefing: Briefing) -> None:
-        self._controller, self._name, self._briefing = controller, name, briefing
-        self._trusted = is_built_in(controller)
+        self._name, self._briefing, self._trusted = name, briefing, is_built_in(controller)
+        with ControllerError.guard(controller, name):  # no drive sees what another has changed
+            self._controller = controller if self._trusted else copy.deepcopy(controller)
         self._route: object = None
         self._state: Any = None
         self._given: tuple[TrackedPath, TrackedPath] | None = None  # the path, and the controller's own

@@ -38,6 +38,9 @@ def finite_twist(command: Any) -> Twist | None:
     return Twist(speed, yaw_rate) if math.isfinite(speed) and math.isfinite(yaw_rate) else None
 
 
+REST = Twist(0.0, 0.0)
+
+
 class Movers(NamedTuple):
     """Movers that a robot perceives in a control period."""
 
@@ -63,22 +66,24 @@ class Observation(NamedTuple):
     Attributes:
         tick: the number of the control period
         t: time since the start [s]
-        pose: estimated pose
-        twist: measured velocity
+        pose: estimated pose; for a controller, when its command takes effect
+        twist: velocity as odometry measures it
         command: the last command
         pending: the commands that have not reached the motors yet, oldest first
         scan: ranges of a scan (beams,) [m]; None if none was due
-        movers: perceived movers
+        movers: perceived movers; a session gives those within 2 m beyond the range, too
+        standing: whether the robot neither drives nor turns
     """
 
     tick: int
     t: float
     pose: Pose
     twist: Twist
-    command: Twist = Twist(0.0, 0.0)
+    command: Twist = REST
     pending: tuple[Twist, ...] = ()
     scan: Floats | None = None
     movers: Movers = NOBODY
+    standing: bool = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,6 +33,7 @@ REGISTRY: Registry[Controller] = Registry(
     lambda: CONTROLLERS,
     _lacks,
     {"start": ("briefing", "path"), "step": ("now", "path", "state")},
+    reserved=("Session",),  # a loop of one's own
 )
 
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from antdrive.base import Pose
 from antdrive.robots import Twist
-from antdrive.robots.control.observation import NOBODY, Observation
+from antdrive.robots.control.observation import NOBODY, REST, Observation
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.parts import SILENT, Drive, Ending, Note
 from antdrive.sim.driving.senses import Senses
-from antdrive.sim.log.ending import arrived, control_periods, outcome_at
+from antdrive.sim.log.ending import arrived, control_periods, outcome_at, stopped
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import scans_logged
 
@@ -57,7 +57,7 @@ class Body:
         self._plant, self._senses, self._localiser, self._task = plant, senses, localiser, task
         self._periods, self._hz = control_periods(limit, hz), hz
         self.estimates: list[Pose] = []
-        self._command = Twist(0.0, 0.0)  # in force
+        self._command = REST  # in force
         self._now: Observation | None = None
         self.tick = 0
         late = None if self._periods else Ending(Outcome.TIMED_OUT)
@@ -67,11 +67,13 @@ class Body:
         """Return what the robot observes in this control period."""
         if self._now is None:
             state, senses = self._plant.state, self._senses
-            pose = self._localiser.update(*senses.read(state))
+            twist, fix = senses.read(state)
+            pose = self._localiser.update(twist, fix)
             scan = senses.lidar.scan(self.tick, state.pose) if senses.lidar else None
-            twist, pending = Twist(state.speed, state.yaw_rate), tuple(senses.pending)
+            standing, pending = stopped((state.speed, state.yaw_rate), REST), tuple(senses.pending)
             movers = senses.movers.read(self.tick, pose[:2]) if senses.movers else NOBODY
-            self._now = Observation(self.tick, self.tick / self._hz, pose, twist, self._command, pending, scan, movers)
+            t = self.tick / self._hz
+            self._now = Observation(self.tick, t, pose, twist, self._command, pending, scan, movers, standing)
         return self._now
 
     def step(self, command: Twist | None, note: Note = SILENT) -> None:
@@ -81,7 +83,7 @@ class Body:
         self.estimates.append(believed)
         stays = command is None and note.ending is None
         if task is not None and self.tick and not stays:  # once it has had a command
-            stays = arrived(believed, now.twist, self._command, task.goal, task.goal_tolerance)
+            stays = now.standing and arrived(believed, REST, self._command, task.goal, task.goal_tolerance)
         if stays:
             self.ended = self._judged(believed)
             return

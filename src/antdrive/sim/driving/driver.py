@@ -8,10 +8,10 @@ from typing import Any
 
 from antdrive.base import Pose
 from antdrive.robots import LIMITERS, PursuitState, RobotSpec, Twist
-from antdrive.robots.control.observation import Briefing, Observation
+from antdrive.robots.control.observation import REST, Briefing, Observation
 from antdrive.robots.noise import moved_by
 from antdrive.sim.driving.guide import Follow, GiveUp, Guide, Moment, Rule, Wait
-from antdrive.sim.driving.parts import EXPLORING_LIMITERS, Drive, Ending, Note, Step, StuckClock
+from antdrive.sim.driving.parts import EXPLORING_LIMITERS, SILENT, Drive, Ending, Note, Step, StuckClock
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.rules import WAITING_SPEED
 from antdrive.sim.driving.survey import Scans
@@ -39,10 +39,12 @@ class Driver:
         scans: reads the lidar; None: unused
         way: the current way
         step: the current step
+        last: its last command and note
         progress: called with the completed fraction of the route
     """
 
     way: Follow
+    last: tuple[Twist | None, Note] = None, SILENT
 
     def __init__(
         self,
@@ -61,20 +63,22 @@ class Driver:
 
     def act(self, now: Observation) -> tuple[Twist | None, Note]:
         """Return the command of one control period, None to stay where the robot stands, and a note on it."""
+        if now.command != self.step.command:  # another one than this mind's
+            self.step = self.step._replace(command=now.command)
         guide, known, before, believed = self.guide, self.briefing, self.step, now.pose
         if now.scan is not None and self.scans is not None:
             believed = self.scans.read(now.tick, believed, now.scan)
-        if now.tick and arrived(believed, now.twist, before.command, known.goal, known.tolerance):
-            return None, Note(believed)
+        if now.tick and now.standing and arrived(believed, REST, before.command, known.goal, known.tolerance):
+            return self._told(None, Note(believed))
         pose = moved_by(believed, now.pending, 1 / self._hz)
-        seen = now if pose is now.pose else now._replace(pose=pose)
+        seen = now if pose is now.pose else now._replace(pose=pose, pending=())
         if self._movers is not None:
             self._movers.read(seen)
         waiting = before.avoids and abs(now.twist.speed) < WAITING_SPEED
         moment = Moment(seen, self.way, before, self._clock, waiting)
         way = guide.path(moment)
         if isinstance(way, GiveUp):
-            return None, Note(believed, ending=way.ending)
+            return self._told(None, Note(believed, ending=way.ending))
         if way is not self.way:
             self._follow(way)
             moment = Moment(seen, way, self.step, self._clock)
@@ -82,16 +86,20 @@ class Driver:
         for rule in self.rules:
             step = rule.apply(moment, step)
         self.step = step
-        if self._at_end_of_route(pose, now.twist, before.command):
+        if self._at_end_of_route(pose, now.standing, before.command):
             way = guide.path(moment, at_end=True)
             if isinstance(way, GiveUp):
-                return None, Note(believed, ending=way.ending)
+                return self._told(None, Note(believed, ending=way.ending))
             self._follow(way)
         turns = isinstance(way, Wait) and way.scan_turn is not None
         self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or turns)
         if now.tick % self._progress_periods == 0:
             self.progress(self.step.pursuit.arc / self.way.path.length)
-        return step.command, Note(believed, step.pursuit.limiter, self._gives_up())
+        return self._told(step.command, Note(believed, step.pursuit.limiter, self._gives_up()))
+
+    def _told(self, command: Twist | None, note: Note) -> tuple[Twist | None, Note]:
+        self.last = command, note
+        return self.last
 
     @property
     def limiters(self) -> tuple[str, ...]:
@@ -123,10 +131,10 @@ class Driver:
             self._clock = self._clock._replace(farthest=0.0)
         self.way = way
 
-    def _at_end_of_route(self, pose: Pose, twist: Twist, last: Twist) -> bool:
+    def _at_end_of_route(self, pose: Pose, standing: bool, last: Twist) -> bool:
         """Return whether the robot stands at the end of its route, and not at the goal, where it arrives in the next period."""
         path, (command, pursuit, *_), known = self.way.path, self.step, self.briefing
-        if path.length - pursuit.arc > path.goal_distance or any(command) or not stopped(twist, last):
+        if path.length - pursuit.arc > path.goal_distance or any(command) or not (standing and stopped(REST, last)):
             return False
         return math.dist(pose[:2], known.goal) > known.tolerance
 
