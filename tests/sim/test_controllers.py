@@ -14,7 +14,8 @@ from antdrive.base.user_code import LOADED
 from antdrive.robots import CONTROLLERS, ControllerError, PurePursuit, Twist, list_controllers
 from antdrive.robots.controllers.dwa import DynamicWindow
 from antdrive.robots.controllers.stanley import Stanley
-from antdrive.runs.campaigns import expand, make_campaign
+from antdrive.runs.campaigns import expand, make_campaign, sweep
+from antdrive.runs.campaigns.results import read_runs
 from antdrive.runs.campaigns.running import Driving
 from antdrive.runs.comparing import Compared
 from antdrive.sim import Scenario, run
@@ -365,3 +366,14 @@ def test_what_a_controller_remembers_about_itself_stays_in_its_drive():
 
     s = scenario(Counting(), time_limit=0.5)
     assert run(s).rollout.digest == run(s).rollout.digest
+
+
+def test_a_campaign_over_controllers_is_compared_by_controller(folder):
+    data = {"worlds": ["empty"], "planners": ["astar"], "settings": {"controller": [*CONTROLLERS], "time_limit": 0.5}}
+    results = sweep(data, folder / "out", jobs=0)
+    table, size = read_runs([results.folder], {}, [])
+    assert (dict.fromkeys(table.columns["planner"]), size) == (
+        dict.fromkeys(f"astar with {name}" for name in CONTROLLERS),
+        len(CONTROLLERS),
+    )
+    assert read_runs([results.folder], {"controller": "dwa"}, [])[0].columns["planner"] == ["astar"]

@@ -76,12 +76,13 @@ class SweepResults:
 
     def medians(self) -> Iterator[tuple[str, ...]]:
         """Yield a table row for each planner: its successes, and the median and extremes of `MEDIANS` over them."""
-        rows = [row for row in self.table.select(["planner", "succeeded", *MEDIANS]).to_pylist() if row["succeeded"]]
-        for planner in dict.fromkeys(row["planner"] for row in rows):
-            own = [row for row in rows if row["planner"] == planner]
+        runs = RunTable(self.table.to_pydict()).by_controller()
+        good = [k for k, succeeded in enumerate(runs.columns["succeeded"]) if succeeded]
+        for planner in dict.fromkeys(runs.columns["planner"][k] for k in good):
+            own = runs.take([k for k in good if runs.columns["planner"][k] == planner])
             cells = []
             for name, unit in MEDIANS.items():
-                values = np.array([row[name] for row in own], dtype=float) * (1000.0 if unit.endswith(" ms") else 1.0)
+                values = own.numbers(name) * (1000.0 if unit.endswith(" ms") else 1.0)
                 cells.append(f"{np.median(values):.3g} ({values.min():.3g} to {values.max():.3g})")
             yield planner, str(len(own)), *cells
 
@@ -169,6 +170,7 @@ def read_runs(folders: Sequence[Path], where: Mapping[str, str], planners: Seque
     if not len(table):
         raise FieldError("runs", "none; the campaign has no finished runs")
     table, left = _chosen(table, missing, where)
+    table = table.by_controller()
     if planners:
         table = table.of_planners(planners)
     return table, len(table) + _count(left, table, planners)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from antdrive.base.errors import FieldError, few
 from antdrive.base.types import Flags, Floats
+from antdrive.sim.forms import USUAL_CONTROLLER
 from antdrive.sim.settings import SETTING_COLUMNS, SETTINGS
 
 LISTED = 20  # most values listed in an error
@@ -158,6 +159,15 @@ class RunTable:
             if label not in mine:
                 raise FieldError("planner", f"unknown {label!r}; the campaign has {', '.join(dict.fromkeys(mine))}")
         return self.take([k for k, label in enumerate(mine) if label in labels])
+
+    def by_controller(self) -> RunTable:
+        """Return the runs with their controllers in the planners' labels, as "astar with dwa", if there are several."""
+        followers = [USUAL_CONTROLLER if name in ("", "default") else name for name in self.texts("controller")]
+        if len(set(followers)) < 2:
+            return self
+        labels = [f"{planner} with {name}" for planner, name in zip(self.texts("planner"), followers, strict=True)]
+        others = {name: values for name, values in self.columns.items() if name != "controller"}
+        return RunTable({**others, "planner": labels})
 
     def take(self, rows: Sequence[int]) -> RunTable:
         """Return some of the runs."""

@@ -5,11 +5,14 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from antdrive.base.checks import suggest
 from antdrive.base.errors import input_error
 from antdrive.runs.suites.suite import SUFFIX, SuiteCase, load_suite
-from antdrive.sim.scenario import Scenario
+
+if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
 
 
 def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] | None = None) -> Scenario:
@@ -25,6 +28,7 @@ def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] | None =
         InputError: an item of the suite is missing or invalid; the message has the suite's file, line and key.
     """
     from antdrive.runs.margins.choice import with_chosen_margin
+    from antdrive.sim.scenario import Scenario
 
     return Scenario.read(case.written, case.suite.parent, case.error, choose=choose or with_chosen_margin)
 
