@@ -106,7 +106,7 @@ def rows(source: Path, drives: int, worlds: int) -> Iterator[list[str]]:
         (ScanMatcher, "corrected", "match"),
         (OccupancyMap, "insert", "map"),
         (Exploration, "trigger", "watch"),
-        (Exploration, "refreshed", "watch"),
+        (Exploration, "_refreshed", "watch"),
         (StoppingConstraint, "limit", "sight"),
         (Exploration, "replan", "replans"),
     ):

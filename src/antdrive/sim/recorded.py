@@ -148,8 +148,9 @@ def rebuilt(
         settings = _settings_in_force(record)
     except (FieldError, InputError) as error:
         raise InputError(str(FieldError(error.key, error.problem).under("record"))) from None
+    word = planner if isinstance(planner, str) else name if planner is None else ""
     words = Written(
-        world="", planner="", options=record.planner.settings, settings=settings, seed=record.seed,
+        world="", planner=word, options=record.planner.settings, settings=settings, seed=record.seed,
     )  # fmt: skip
 
     def at(key: str, problem: str) -> InputError:
