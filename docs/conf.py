@@ -73,6 +73,8 @@ nitpick_ignore_regex = [
     # How `sweep` words the origin of random tasks.
     ("py:class", r"antdrive\.runs\.campaigns\.job\.TaskOrigin"),
     ("py:class", "ErrorAt"),  # a type of functions
+    ("py:class", r"Flags|antdrive\.base\.(registry\.Component|components\.Declared)"),  # an array, and type variables
+    ("py:.*", r"(gymnasium\.[\w.]+|ResetNeeded)"),
     # How a record's field is read from JSON.
     ("py:.*", r"antdrive\.[\w.]+\.(Annotated|_to_\w+)"),
     # Contents of files, whose keys the pages on formats describe.
