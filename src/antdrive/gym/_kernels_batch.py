@@ -144,16 +144,19 @@ def limited(
 ) -> tuple[float, float]:
     """Return the command after another one, towards a part of the highest speed and yaw rate, within all limits.
 
-    The speed changes by at most the acceleration, the yaw rate by at most the yaw acceleration. The lateral acceleration and
-    the wheels' speed limit the yaw rate.
+    The speed changes by at most the acceleration, the yaw rate by at most the yaw acceleration, with which it falls to what
+    the lateral acceleration and the wheels' speed allow; until then the speed gives way. Wheels that would be too fast slow both.
     """
-    most, most_turn = limits[2] * period, limits[3] * period
+    last, most, most_turn = speed, limits[2] * period, limits[3] * period
     speed += min(max(to_speed * limits[0] - speed, -most), most)
-    turn += min(max(to_turn * limits[1] - turn, -most_turn), most_turn)
     bound = max(limits[5] - abs(speed), 0.0) / limits[6]
     if abs(speed) * bound > limits[4]:
         bound = limits[4] / abs(speed)
-    return speed, min(max(turn, -bound), bound)
+    turn += min(max(min(max(to_turn * limits[1], -bound), bound) - turn, -most_turn), most_turn)
+    slow = limits[4] / max(abs(turn), 1e-9)  # the yaw rate falls too slowly for a higher speed
+    speed = min(max(min(max(speed, -slow), slow), last - most), last + most)
+    share = min(limits[5] / max(abs(speed) + abs(turn) * limits[6], 1e-9), 1.0)
+    return speed * share, turn * share
 
 
 @kernel
