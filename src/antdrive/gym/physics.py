@@ -11,6 +11,7 @@ from antdrive.base.types import Flags, Floats
 from antdrive.gym import _kernels_batch as kernels
 from antdrive.gym.batch import ACTION_HZ, CONTROL_HZ, ENDINGS, PHYSICS_HZ, Episode, KinematicPlant
 from antdrive.robots import RobotSpec, Twist
+from antdrive.robots.control.observation import REST
 from antdrive.sim import Perception, Scenario, Session, certify
 
 
@@ -79,7 +80,7 @@ class PhysicsPlant(KinematicPlant):
         robots.tick[i], robots.timing[i, 0] = now.tick, len(now.pending)
         state[kernels.BELIEVED : kernels.BELIEVED + 3] = now.pose
         state[kernels.MEASURED : kernels.MEASURED + 2] = now.twist
-        state[kernels.SPEED], state[kernels.TURN] = Twist(0.0, 0.0) if now.standing else now.twist
+        state[kernels.SPEED], state[kernels.TURN] = REST if now.standing else now.twist
         if now.scan is not None:
             robots.seen[i, : len(now.scan)] = np.clip(now.scan / self._shared.ranges[1], 0.0, 1.0)
         for k, command in enumerate(now.pending):

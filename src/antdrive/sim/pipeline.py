@@ -23,7 +23,7 @@ from antdrive.sim.compose import compose
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.driver import Progress, ignore_progress
 from antdrive.sim.driving.guide import Follow
-from antdrive.sim.driving.parts import SILENT, Drive, Ending, Note
+from antdrive.sim.driving.parts import SILENT, Drive, Ending, Note, at_goal
 from antdrive.sim.driving.plants import Bullet
 from antdrive.sim.facts import ENDED_BY as ENDED_BY
 from antdrive.sim.facts import Run as Run
@@ -170,9 +170,9 @@ class Session:
         """Return a command from outside within the robot's limits, and a note on it."""
         if note is not SILENT:
             raise FieldError("note", "belongs to another command; leave it out")
-        self._by_itself, goal, tolerance = False, self.briefing.goal, self.briefing.tolerance
+        self._by_itself = False
         if command is None:
-            there = now.standing and math.dist(now.pose[:2], goal) <= tolerance
+            there = at_goal(now, now.pose, self.briefing.goal, self.briefing.tolerance)
             return None, SILENT if there else Note(
                 ending=Ending(Outcome.STOPPED, "stopped by the loop that commanded it")
             )

@@ -19,7 +19,8 @@ from antdrive.base import Floats
 from antdrive.base.components import ComponentError
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import arc_lengths
-from antdrive.robots import PursuitState, Twist, footprint_clearance
+from antdrive.robots import PursuitState, footprint_clearance
+from antdrive.robots.control.observation import REST
 from antdrive.robots.noise import moved_by
 from antdrive.runs.failures.failure import Attempt, Failure
 from antdrive.sim.compose import route_planner
@@ -126,7 +127,7 @@ def rehearsed_clearance(s: Scenario) -> float:
     plant = Kinematic(s.task.start, period, s.robot)
     limit = SETTLING + PATIENCE * route.length / s.robot.max_speed
     body = Body(plant, *measured, hz=s.control_hz, limit=limit)
-    command, state = Twist(0.0, 0.0), PursuitState()
+    command, state = REST, PursuitState()
     while body.ended is None and not (
         state.arc > path.length - path.goal_distance and abs(plant.state.speed) < STANDING
     ):

@@ -11,9 +11,9 @@ from antdrive.base import Pose
 from antdrive.robots import Twist
 from antdrive.robots.control.observation import NOBODY, REST, Observation
 from antdrive.sim.driving.localising import Exact
-from antdrive.sim.driving.parts import SILENT, Drive, Ending, Note
+from antdrive.sim.driving.parts import SILENT, Drive, Ending, Note, at_goal
 from antdrive.sim.driving.senses import Senses
-from antdrive.sim.log.ending import arrived, control_periods, outcome_at, stopped
+from antdrive.sim.log.ending import control_periods, outcome_at, stopped
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import scans_logged
 
@@ -82,8 +82,8 @@ class Body:
         believed = self._localiser.pose = note.pose or now.pose
         self.estimates.append(believed)
         stays = command is None and note.ending is None
-        if task is not None and self.tick and not stays:  # once it has had a command
-            stays = now.standing and arrived(believed, REST, self._command, task.goal, task.goal_tolerance)
+        if task is not None and not stays:
+            stays = at_goal(now, believed, task.goal, task.goal_tolerance)
         if stays:
             self.ended = self._judged(believed)
             return

@@ -11,11 +11,11 @@ from antdrive.robots import LIMITERS, PursuitState, RobotSpec, Twist
 from antdrive.robots.control.observation import REST, Briefing, Observation
 from antdrive.robots.noise import moved_by
 from antdrive.sim.driving.guide import Follow, GiveUp, Guide, Moment, Rule, Wait
-from antdrive.sim.driving.parts import EXPLORING_LIMITERS, SILENT, Drive, Ending, Note, Step, StuckClock
+from antdrive.sim.driving.parts import EXPLORING_LIMITERS, SILENT, Drive, Ending, Note, Step, StuckClock, at_goal
 from antdrive.sim.driving.perceived_movers import PerceivedMovers
 from antdrive.sim.driving.rules import WAITING_SPEED
 from antdrive.sim.driving.survey import Scans
-from antdrive.sim.log.ending import STUCK_TIME, arrived, stopped
+from antdrive.sim.log.ending import STUCK_TIME, stopped
 from antdrive.sim.log.outcome import Outcome
 
 PROGRESS_HZ = 10  # reports of progress per simulated second
@@ -68,7 +68,7 @@ class Driver:
         guide, known, before, believed = self.guide, self.briefing, self.step, now.pose
         if now.scan is not None and self.scans is not None:
             believed = self.scans.read(now.tick, believed, now.scan)
-        if now.tick and now.standing and arrived(believed, REST, before.command, known.goal, known.tolerance):
+        if at_goal(now, believed, known.goal, known.tolerance):
             return self._told(None, Note(believed))
         pose = moved_by(believed, now.pending, 1 / self._hz)
         seen = now if pose is now.pose else now._replace(pose=pose, pending=())

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from antdrive.base import Pose
-from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, Twist, footprint_clearance
+from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, footprint_clearance
 from antdrive.robots.clearance import footprint_distances, obstacle_name
+from antdrive.robots.control.observation import REST
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.plants import Kinematic
@@ -59,7 +60,7 @@ def _rehearsed(
     """
     plant = Kinematic(start, 1 / hz, robot, world)
     body = Body(plant, Senses(), Exact(start, 1 / hz), hz=hz, limit=REHEARSED)
-    command, state = Twist(0.0, 0.0), PursuitState()
+    command, state = REST, PursuitState()
     while body.ended is None:
         pose = body.observe().pose
         if not is_narrow(world, robot, pose):

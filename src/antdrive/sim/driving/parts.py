@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base import Floats, Pose
+from antdrive.base import Floats, Point, Pose
 from antdrive.robots import LIMITERS, PursuitState, Twist
-from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME
+from antdrive.robots.control.observation import REST, Observation
+from antdrive.sim.log.ending import STUCK_PROGRESS, STUCK_TIME, arrived
 from antdrive.sim.log.outcome import Outcome
 
 EXPLORING_LIMITERS = (*LIMITERS, "sight")  # names of the limiting rules of a mapless robot
@@ -37,10 +38,15 @@ class Note(NamedTuple):
 SILENT = Note()
 
 
+def at_goal(now: Observation, believed: Pose, goal: Point, tolerance: float) -> bool:
+    """Return whether a robot stands at the goal by the pose in which it believes, once it has had a command."""
+    return now.tick > 0 and now.standing and arrived(believed, REST, now.command, goal, tolerance)
+
+
 class Step(NamedTuple):
     """Command and controller state of one control period."""
 
-    command: Twist = Twist(0.0, 0.0)  # the commanded twist
+    command: Twist = REST  # the commanded twist
     # the controller's state: progress along the path, and the rule that limited the speed
     pursuit: PursuitState = PursuitState()
     speed_limit: float = math.inf  # speed limit of the schedule [m/s]

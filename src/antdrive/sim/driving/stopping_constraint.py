@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from antdrive.base import Pose
 from antdrive.robots import RobotSpec, Twist
+from antdrive.robots.control.observation import REST
 from antdrive.sim.driving.guide import Moment
 from antdrive.sim.driving.parts import SIGHT_LIMIT, Step
 from antdrive.sim.driving.rules import stopping_time
@@ -15,7 +16,6 @@ from antdrive.sim.driving.survey import Survey
 SLOWEST = 0.02  # below this speed `SHORT` applies to the turn as well [m/s]
 SHORT = 0.01  # reserve of the observed free path [m], [rad]
 ON_THE_SPOT = 1e-6  # arcs of a smaller radius are turns on the spot [m]
-STILL = Twist(0.0, 0.0)
 
 
 class StoppingConstraint:
@@ -53,14 +53,14 @@ class StoppingConstraint:
         if share >= 1:
             return command, False
         slower, kept = _scaled(command, share), self._braked(last)
-        if kept == STILL or _slows_no_more(slower, kept):
+        if kept == REST or _slows_no_more(slower, kept):
             return slower, True
         return kept, True
 
     def _allowed(self, pose: Pose, command: Twist) -> float:
         """Return the largest fraction of a command, at most 1, from which the robot stops on observed free ground."""
         speed, rate = abs(command.speed), abs(command.yaw_rate)
-        if command == STILL:
+        if command == REST:
             return 1.0
         stop = stopping_time(command, self._robot)
         going = self._reaction + stop / 2  # time at constant speed that covers the stopping distance [s]
@@ -79,12 +79,12 @@ class StoppingConstraint:
     def _braked(self, last: Twist) -> Twist:
         """Return the next command of a robot that brakes as hard as it can on its arc."""
         stop = stopping_time(last, self._robot)
-        return _scaled(last, 1 - self._period / stop) if stop > self._period else STILL
+        return _scaled(last, 1 - self._period / stop) if stop > self._period else REST
 
 
 def _scaled(twist: Twist, share: float) -> Twist:
     """Return a twist scaled on the same arc."""
-    return Twist(twist.speed * share, twist.yaw_rate * share) if share > 0 else STILL
+    return Twist(twist.speed * share, twist.yaw_rate * share) if share > 0 else REST
 
 
 def _slows_no_more(twist: Twist, kept: Twist) -> bool:
