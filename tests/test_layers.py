@@ -20,12 +20,14 @@ RANKS = {
     "worlds": 1,
     "planners": 2,
     "robots": 2,
-    "sim": 3,
-    "runs": 4,
-    "views": 5,
-    "testing": 6,
-    "gym": 6,
-    "cli": 7,
+    "proof": 3,
+    "foreign": 5,
+    "sim": 4,
+    "runs": 6,
+    "views": 7,
+    "testing": 8,
+    "gym": 8,
+    "cli": 9,
 }
 MODULES = sorted(path for room in RANKS for path in (ROOT / room).rglob("*.py"))
 #: Functions that hide a package of their name; its kernels keep this one where it is.

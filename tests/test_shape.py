@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "antdrive"
-PACKAGES = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "testing", "gym", "cli")
+PACKAGES = ("base", "worlds", "planners", "robots", "proof", "sim", "foreign", "runs", "views", "testing", "gym", "cli")
 MODULES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 #: Parameters that their name and type explain.
 PLAIN = {

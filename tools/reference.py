@@ -304,24 +304,24 @@ def record() -> list[str]:
 
 def proofs() -> list[str]:
     """Return which level of verification checks each array and each key of a log's record."""
-    from antdrive.sim.log.record import PROOFS, Proof
+    from antdrive.sim.log.record import PROOFS, Evidence
     from antdrive.sim.log.rollout import FORMS
 
     levels = {
-        Proof.LOG: "`verify` recomputes",
-        Proof.WORLD: "`--world` compares or recomputes",
-        Proof.ROBOT: "`--robot` compares",
-        Proof.REPLAY: "`--replay` recomputes",
-        Proof.INPUT: "inputs, with which `--replay` drives",
-        Proof.CLAIM: "nothing checks",
+        Evidence.LOG: "`verify` recomputes",
+        Evidence.WORLD: "`--world` compares or recomputes",
+        Evidence.ROBOT: "`--robot` compares",
+        Evidence.REPLAY: "`--replay` recomputes",
+        Evidence.INPUT: "inputs, with which `--replay` drives",
+        Evidence.CLAIM: "nothing checks",
     }
 
-    def row(proof: Proof) -> Row:
+    def row(proof: Evidence) -> Row:
         arrays = [code(name) for name, form in FORMS.items() if form.proof is proof]
         keys = [code(key) for key, one in PROOFS.items() if one is proof]
         return levels[proof], ", ".join(arrays), ", ".join(keys)
 
-    return table("level, arrays, keys of the record", map(row, Proof))
+    return table("level, arrays, keys of the record", map(row, Evidence))
 
 
 def json_type(annotation: str) -> str:

@@ -16,12 +16,14 @@ ROWS = (
     ("testing", "gym"),
     ("views",),
     ("runs",),
+    ("foreign",),
     ("sim",),
+    ("proof",),
     ("planners", "robots"),
     ("worlds",),
     ("base",),
 )  # from the top
-WIDTH, HEIGHT, BOX, STEP, LEFT = 760, 536, 44, 66, 20  # [px]
+WIDTH, HEIGHT, BOX, STEP, LEFT = 760, 668, 44, 66, 20  # [px]
 
 
 def imports() -> dict[str, set[str]]:

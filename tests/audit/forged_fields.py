@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.sim import Rollout
-from antdrive.sim.log.record import LABELS, PROOFS, Proof
+from antdrive.sim.log.record import LABELS, PROOFS, Evidence
 from antdrive.sim.log.rollout import FORMS, NOISY, ROWS
 from tests.audit.forged_logs import KINDS, Array, Log
 
@@ -19,8 +19,8 @@ Generator = np.random.Generator
 
 #: The last level that must refuse a value of a declared check; an input may be changed where the same drive follows.
 LEVEL_OF = {
-    Proof.LOG: "verify", Proof.WORLD: "files", Proof.ROBOT: "files", Proof.REPLAY: "replay", Proof.INPUT: "replay",
-    Proof.CLAIM: "none",
+    Evidence.LOG: "verify", Evidence.WORLD: "files", Evidence.ROBOT: "files", Evidence.REPLAY: "replay", Evidence.INPUT: "replay",
+    Evidence.CLAIM: "none",
 }  # fmt: skip
 LEAST, MOST = 2e-3, 2.0  # of changes of numbers; smaller ones may be rounding
 FACTORS = (0.5, 0.9, 0.97, 1.03, 1.1, 2.0)
@@ -37,7 +37,7 @@ class Entry:
     """
 
     name: str
-    proof: Proof
+    proof: Evidence
     forge: Callable[[Log, Generator], bool]
 
 

@@ -33,7 +33,7 @@ from antdrive.robots import Footprint, load_robot
 from antdrive.runs.margins.choice import with_chosen_margin
 from antdrive.sim import Perception, Rollout, Scenario, certify, run
 from antdrive.sim.log.consistency import wrong_optima
-from antdrive.sim.log.record import PROOFS, DriveRecord, Proof, differences, plain_value
+from antdrive.sim.log.record import PROOFS, DriveRecord, Evidence, differences, plain_value
 from antdrive.sim.rerun import mismatches, rerun
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
 from benchmarks.markdown import command_line, print_table
@@ -193,7 +193,7 @@ def inputs_of(record: DriveRecord) -> str:
     values = plain_value(record)
     for key, proof in PROOFS.items():
         name, _, rest = key.partition(".")
-        if proof in (Proof.INPUT, Proof.ROBOT) or name in ("task", "robot"):
+        if proof in (Evidence.INPUT, Evidence.ROBOT) or name in ("task", "robot"):
             continue
         if rest and not name.endswith("[]"):
             (values.get(name) or {}).pop(rest, None)
@@ -245,7 +245,7 @@ def accepted(finding: Finding) -> bool:
     """Return whether a forgery passed the level that must refuse it; an input with which the same drive follows is none."""
     if finding.level == CRASHED:
         return True
-    same = finding.level == "none" and finding.kind in ENTRIES and ENTRIES[finding.kind].proof is Proof.INPUT
+    same = finding.level == "none" and finding.kind in ENTRIES and ENTRIES[finding.kind].proof is Evidence.INPUT
     return not same and LEVELS.index(finding.level) > LEVELS.index(level_of(finding.kind))
 
 

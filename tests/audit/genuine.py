@@ -23,7 +23,7 @@ from antdrive.base.errors import InputError
 from antdrive.base.files import as_json
 from antdrive.sim import Rollout, Run, run
 from antdrive.sim.log.metrics import measure
-from antdrive.sim.log.record import Proof
+from antdrive.sim.log.record import Evidence
 from antdrive.sim.log.rollout import FORMS
 from antdrive.sim.verifying import verify_log
 from benchmarks.markdown import command_line, print_table
@@ -45,7 +45,7 @@ CLAIMED = (
 )  # of a result.json
 ASKED = ("perception", "avoidance", "replanning")  # settings that the log has as driven, not as asked
 #: Forgeries of values that a log without its replay shows.
-SHOWN = [name for name, entry in ENTRIES.items() if entry.proof in (Proof.LOG, Proof.WORLD, Proof.ROBOT)]
+SHOWN = [name for name, entry in ENTRIES.items() if entry.proof in (Evidence.LOG, Evidence.WORLD, Evidence.ROBOT)]
 OPTIMA = [name for name in KINDS if "optimum" in name]
 CONTACT = ("physics reports", "closed form: ", "checks disagree", "between two logged poses")
 CLOSE = 0.002  # a drive closer to an obstacle may be too close to certify [m]

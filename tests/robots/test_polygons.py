@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from antdrive.base import FieldError
+from antdrive.proof.distances import _polygon_to_points, to_walls
 from antdrive.robots import Footprint, footprint_clearance, load_robot
 from antdrive.robots.clearance import footprint_distances, kernel_shape
 from antdrive.robots.control._kernels_obstacles import turn_clearance
 from antdrive.robots.spec import yaw_inertia
 from antdrive.sim.driving._kernels_movers import lower_by_movers
-from antdrive.sim.log.certificate import _polygon_to_points, _polygon_to_walls
 from antdrive.sim.log.contacts import _gap
 from antdrive.worlds import Disc, World
 
@@ -89,7 +89,7 @@ def test_the_distance_to_the_walls_is_that_of_the_outline(foot, pose):
     edge = outline(foot, pose)
     expected = [edge.real.min() + 4, 6 - edge.real.max(), edge.imag.min() + 5, 7 - edge.imag.max()]
     assert footprint_clearance(world, foot, [pose])[0] == pytest.approx(min(expected), abs=1e-4)
-    walls = _polygon_to_walls(foot.corners, np.array([pose]), world.bounds)[0] - foot.rounding
+    walls = to_walls(foot, np.array([pose]), world.bounds)[0]
     np.testing.assert_allclose(walls, expected, atol=1e-4)
     robot = dataclasses.replace(load_robot("warehouse"), footprint=WIDE)
     object.__setattr__(robot, "footprint", foot)

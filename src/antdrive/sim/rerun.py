@@ -27,7 +27,7 @@ from antdrive.base.version import versions
 from antdrive.planners import Planner, PlanResult, TimedPlan, is_built_in
 from antdrive.robots import Controller
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import PROOFS, Proof, plain_value
+from antdrive.sim.log.record import PROOFS, Evidence, plain_value
 from antdrive.sim.log.rollout import FORMS, NOISY, ROWS, Rollout
 from antdrive.sim.pipeline import driven, plan
 from antdrive.sim.recorded import rebuilt
@@ -238,7 +238,7 @@ def mismatches(rollout: Rollout, again: Rollout) -> Iterator[Mismatch]:
     yield from arrays
     logged, computed = plain_value(rollout.record), plain_value(again.record)
     for key, proof in PROOFS.items():
-        if proof is not Proof.CLAIM:
+        if proof is not Evidence.CLAIM:
             yield from _of_key(key, logged, computed, exact=not arrays)
 
 

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.proof import distances
 from antdrive.robots import footprint_clearance
 from antdrive.sim import Outcome, Rollout, certify
-from antdrive.sim.log import certificate
 from antdrive.sim.log.certificate import closed_form_clearance, in_metres
 from antdrive.sim.log.record import PerceptionRecord, ReplanRecord
 from antdrive.sim.policy import Trigger
@@ -63,7 +63,7 @@ def test_a_log_takes_a_few_distances_for_each_row_unless_it_leaps(log, monkeypat
     rng = np.random.default_rng(2)
     full = crowded(log, rng)
     rows, count = len(full.t), len(full.record.world.obstacles)
-    monkeypatch.setattr(certificate, "MAX_NEAR_DISTANCES", rows * count // 4)
+    monkeypatch.setattr(distances, "MAX_NEAR_DISTANCES", rows * count // 4)
     assert not any("take more than" in problem for problem in certify(full).problems)
     xmin, ymin, xmax, ymax = full.record.world.bounds
     pose = full.pose.copy()
@@ -103,7 +103,7 @@ def test_no_disc_that_is_left_out_is_the_nearest_to_a_footprint(seed, step, coun
     discs = np.column_stack([rng.uniform(-size, size, (count, 2)), rng.uniform(0, size / 2, count)])
     x, y = np.cumsum(rng.normal(0, step, (2, 12)), axis=1)
     radius = rng.uniform(0, size / 2)
-    ((_, looked_at),) = certificate._blocks(np.column_stack([x, y]), radius, discs)
+    ((_, looked_at),) = distances._blocks(np.column_stack([x, y]), radius, discs)
     near = {tuple(disc) for disc in looked_at.tolist()}
     # A footprint of this radius reaches between 0 and `radius` towards a disc: the nearest one is that for some reach.
     for px, py in zip(x, y, strict=True):

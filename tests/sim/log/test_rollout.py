@@ -19,7 +19,7 @@ from antdrive.base.errors import FieldError
 from antdrive.sim import Outcome, Rollout, certify, measure
 from antdrive.sim.log import rollout
 from antdrive.sim.log.margin import budget
-from antdrive.sim.log.record import PROOFS, DriveRecord, PlanRecord, Proof, SensingRecord, TimesRecord, proofs_of
+from antdrive.sim.log.record import PROOFS, DriveRecord, Evidence, PlanRecord, SensingRecord, TimesRecord, proofs_of
 from antdrive.sim.log.rollout import ARRAYS, read_record
 from antdrive.worlds.movers import Cruising, Keyframed, Wandering
 from tests.records import changed, made_up_record
@@ -367,7 +367,7 @@ def test_every_value_of_a_record_declares_its_check(small_run):
     assert keys == {field.name for field in dataclasses.fields(record)}
     assert {f"plan.{key}" for key in record.as_dict()["plan"]} == {key for key in PROOFS if key.startswith("plan.")}
     assert "replans[].route" in PROOFS
-    assert PROOFS["versions"] is PROOFS["times.plan_s"] is PROOFS["task.name"] is Proof.CLAIM
+    assert PROOFS["versions"] is PROOFS["times.plan_s"] is PROOFS["task.name"] is Evidence.CLAIM
 
     @dataclasses.dataclass
     class Undeclared:

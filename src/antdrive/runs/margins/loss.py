@@ -16,10 +16,10 @@ from antdrive.base import Floats
 from antdrive.base.kernel_cache import sources_stamp
 from antdrive.base.version import versions
 from antdrive.planners import PLANNERS, Query, smooth
+from antdrive.proof.track import Track, between_rows
 from antdrive.robots import RobotSpec, outline_of
 from antdrive.sim.driving.drive import follow
 from antdrive.sim.driving.senses import positioning
-from antdrive.sim.log.certificate import travel_between
 from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.streams import random_stream
@@ -160,6 +160,6 @@ def loss_on_course(conditions: LossFactors, margin: float, seed: int) -> Loss:
     if log.outcome is not Outcome.SUCCEEDED or log.physics:
         return Loss(math.inf, math.inf)
     disc = log.clearance if c.outlined else point_clearance(task.world, log.pose[:, :2]) - robot.radius
-    travel = travel_between(log.t, log.pose, log.twist, robot.radius)
-    between = (((room[:-1] + room[1:] - travel) / 2).min(initial=room.min()) for room in (log.clearance, disc))
+    reach = Track.measured(log.t, log.pose, log.twist, robot.footprint).reach
+    between = (between_rows(room, reach).min(initial=room.min()) for room in (log.clearance, disc))
     return Loss(*(margin - float(bound) for bound in between))

@@ -2,10 +2,8 @@
 
 1. PyBullet's contacts of the chassis at every physics step.
 2. The closed-form distance between footprint and obstacles at every logged pose, computed here independently.
-3. A bound between two logged poses. No point of the footprint moves farther than the axle's centre
-   travels plus the footprint's radius times the turn, so the clearance in between is at least
-   (c_i + c_{i+1} - travel) / 2. For a mover its own travel is added; where the mover teleports, the bound is
-   min(c_i, c_{i+1}) - travel.
+3. A bound between two logged poses, see `antdrive.proof.track`: no point of the footprint moves farther than the axle's
+   centre travels plus the footprint's radius times the turn.
 
 Movers must follow the record's task and seed. Further checks detect logs that were altered or do not describe a single drive;
 each is a function `_check_...` that yields a sentence per error.
@@ -14,24 +12,26 @@ each is a function `_check_...` that yields a sentence per error.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
-from antdrive.base.plane import format_numbers, segment_lengths, wrap_angle
-from antdrive.base.types import Bounds, Floats, Point
+from antdrive.base.plane import format_numbers, wrap_angle
+from antdrive.base.types import Floats
+from antdrive.proof.distances import to_discs, to_walls
+from antdrive.proof.track import Track, prove
 from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.sim.log.consistency import GRIP, inconsistencies, windowed
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
-from antdrive.worlds.limits import MAX_NEAR_DISTANCES
 from antdrive.worlds.trajectories import Trajectories
+from antdrive.worlds.world import World
 
 SAME_CLEARANCE = 1e-9  # tolerance of closed-form distances that are computed twice [m]
 # Contact points describe the pose before a step, and a robot sinks some millimetres into an obstacle. A contact at a larger
@@ -69,6 +69,7 @@ class Certificate:
         moved: largest distance of the robot from its first position [m]; nan for a log of wrong shape
     """
 
+    claim: ClassVar[str] = "certified collision-free"  # of a certified drive
     certified: bool
     contacts: int
     min_clearance: float
@@ -81,7 +82,12 @@ class Certificate:
         """Whether the drive is certified, in words."""
         if self.certified and self.moved <= NOWHERE:
             return "certified: touched nothing, went nowhere"
-        return "certified collision-free" if self.certified else "NOT certified collision-free"
+        return self.claim if self.certified else f"NOT {self.claim}"
+
+    @property
+    def caption(self) -> str:
+        """Line at the end of films."""
+        return f"certified: never closer than {self.bound:.3f} m" if self.certified else f"not {self.claim}"
 
     @property
     def sentence(self) -> str:
@@ -118,6 +124,7 @@ def in_metres(value: float) -> str:
     return f"{value:.4f} m" if abs(value) >= 5e-5 or value == 0 else f"{value:.1e} m"
 
 
+@functools.singledispatch
 def certify(rollout: Rollout) -> Certificate:
     """Certify from the log alone that robot and obstacles never touched."""
     touched = len(rollout.contacts)
@@ -129,11 +136,10 @@ def certify(rollout: Rollout) -> Certificate:
     except ValueError as error:
         return Certificate(False, touched, math.nan, math.nan, (f"record.task: {error}",))
     try:
-        still, moving = _clearances(rollout)
+        proof = prove(*_tracks(rollout, movers))
     except FieldError as error:
         return Certificate(False, touched, math.nan, math.nan, (str(error),))
-    clearance = _nearest(still, moving)
-    bound = float(_between_steps(rollout, movers, still, moving).min())
+    clearance, bound = proof.clearance, proof.bound
     problems = [*_check_digest(rollout), *_check_times(rollout)]
     rollout = dataclasses.replace(rollout, t=_clock(rollout))  # further checks use nominal times
     problems = [
@@ -156,122 +162,19 @@ def closed_form_clearance(rollout: Rollout) -> Floats:
 
     It shares no code with the compiled geometry of the drive, so that each checks the other.
     """
-    return _nearest(*_clearances(rollout))
+    return prove(*_tracks(rollout, rollout.trajectories())).clearance
 
 
-def _nearest(still: Floats, moving: Floats) -> Floats:
-    """Return the smaller distance of each row, to what stands (T,) or to a mover (T, M), shape (T,) [m]."""
-    return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
-
-
-def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
-    """Return the distances from the footprint to the nearest cylinder or wall (T,) and to each mover (T, M) [m]."""
-    foot, world, pose = rollout.record.robot.footprint, rollout.record.world, rollout.pose
-    radii, sides = np.array([mover.radius for mover in world.movers]), max(1, len(foot.corners))
-    best = _to_walls(foot, pose, world.bounds).min(axis=1)
-    for block, near in _blocks(pose[:, :2], foot.radius, world.discs):
-        for rows in np.array_split(block, 1 + len(block) * len(near) * sides // 1_000_000):
-            best[rows] = np.minimum(best[rows], _to_discs(foot, pose[rows], near[None, :, :2], near[:, 2]).min(axis=1))
-    moving = np.empty((len(pose), len(radii)))
-    for rows in np.array_split(np.arange(len(pose)), 1 + moving.size * sides // 1_000_000) if len(radii) else ():
-        moving[rows] = _to_discs(foot, pose[rows], rollout.movers[rows], radii)
-    return np.asarray(best), moving
-
-
-def _to_discs(foot: Footprint, pose: Floats, centres: Floats, radii: Floats) -> Floats:
-    """Return the distances (T, N) [m] from a footprint at poses (T, 3) to discs (N,) at centres (T or 1, N, 2)."""
-    x, y, yaw = (column[:, None] for column in pose.T)
-    body = (centres[..., 0] + 1j * centres[..., 1] - (x + 1j * y)) * np.exp(-1j * yaw)  # in the robot's frame
-    if foot.corners:
-        return _polygon_to_points(foot.corners, body) - foot.rounding - radii
-    ahead, aside = np.abs(body.real) - foot.half_length, np.abs(body.imag) - foot.half_width
-    outside = np.sqrt(np.maximum(ahead, 0.0) ** 2 + np.maximum(aside, 0.0) ** 2)
-    return np.asarray(outside + np.minimum(np.maximum(ahead, aside), 0.0) - foot.rounding - radii)
-
-
-def _to_walls(foot: Footprint, pose: Floats, bounds: Bounds) -> Floats:
-    """Return the distances from a footprint at poses (T, 3) to the left, right, lower and upper wall (T, 4) [m]."""
-    if foot.corners:
-        return _polygon_to_walls(foot.corners, pose, bounds) - foot.rounding
-    x, y, yaw = pose.T
-    half, rotation = np.array([foot.half_length, foot.half_width]), np.abs(np.stack([np.cos(yaw), np.sin(yaw)]))
-    reach_x, reach_y = half @ rotation + foot.rounding, half[::-1] @ rotation + foot.rounding
-    xmin, ymin, xmax, ymax = bounds
-    return np.stack([x - reach_x - xmin, xmax - x - reach_x, y - reach_y - ymin, ymax - y - reach_y], axis=1)
-
-
-def _polygon_to_points(corners: tuple[Point, ...], points: npt.NDArray[np.complex128]) -> Floats:
-    """Return the distance from a convex polygon to points x + iy (...) in its frame, negative within it [m].
-
-    Each point is rotated into the frame of each edge: the edge along the real axis, the inside to the left.
-    """
-    here = np.array([complex(*corner) for corner in corners])
-    if len(here) == 1:
-        return np.asarray(np.abs(points - here[0]))
-    edge = np.roll(here, -1) - here
-    seen = (points[..., None] - here) * (np.conj(edge) / np.abs(edge))
-    apart = np.abs(seen - np.clip(seen.real, 0.0, np.abs(edge))).min(axis=-1)
-    depth = seen.imag.min(axis=-1)
-    return np.asarray(np.where(depth >= 0, -depth, apart))
-
-
-def _polygon_to_walls(corners: tuple[Point, ...], pose: Floats, bounds: Bounds) -> Floats:
-    """Return the distance from a polygon at each pose (T, 3) to the left, right, lower and upper wall, shape (T, 4) [m]."""
-    here = np.array([complex(*corner) for corner in corners])
-    placed = (pose[:, 0] + 1j * pose[:, 1])[:, None] + np.exp(1j * pose[:, 2])[:, None] * here
-    xmin, ymin, xmax, ymax = bounds
-    low, high = placed.real.min(axis=1), placed.real.max(axis=1)
-    near, far = placed.imag.min(axis=1), placed.imag.max(axis=1)
-    return np.stack([low - xmin, xmax - high, near - ymin, ymax - far], axis=1)
-
-
-def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.NDArray[np.int64], Floats]]:
-    """Yield blocks of rows (B,) with the discs (N, 3) that may be nearest to the footprint there."""
-    if not len(discs):
-        return
-    count = 0
-    for first in range(0, len(places), BLOCK):
-        block = places[first : first + BLOCK]
-        spread = math.sqrt(float(((block - block[0]) ** 2).sum(axis=1).max()))
-        # The distances of centre and footprint differ by at most the radius.
-        dx, dy = discs[:, 0] - block[0, 0], discs[:, 1] - block[0, 1]
-        away = np.sqrt(dx * dx + dy * dy) - discs[:, 2]
-        near = discs[away <= away.min() + 2 * spread + radius + SAME_CLEARANCE]
-        count += len(block) * len(near)
-        if count > MAX_NEAR_DISTANCES:
-            raise FieldError(
-                "pose",
-                f"{len(places)} rows that leap between {len(discs)} obstacles take more than {MAX_NEAR_DISTANCES:.0e} "
-                f"distances to check, by row {first}; a drive takes a few for each row",
-            )
-        yield np.arange(first, first + len(block)), near
-
-
-def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving: Floats) -> Floats:
-    """Return a lower bound on the clearance between consecutive rows, shape (T - 1,) [m]; for one row, its clearance."""
-    if len(still) < 2:
-        return _nearest(still, moving)
-    radius = rollout.record.robot.footprint.radius
-    travel = travel_between(_clock(rollout), rollout.pose, rollout.twist, radius)
-    bound = (still[:-1] + still[1:] - travel) / 2
-    if movers:
-        t = _clock(rollout)
-        both = travel[:, None] + movers.travel(t)
-        steady = (moving[:-1] + moving[1:] - both) / 2
-        teleporting = np.minimum(moving[:-1], moving[1:]) - both
-        bound = np.minimum(bound, np.where(movers.jumps(t), teleporting, steady).min(axis=1))
-    return np.asarray(bound)
-
-
-def travel_between(t: Floats, pose: Floats, twist: Floats, radius: float) -> Floats:
-    """Return how far a point within a radius [m] of the axle's centre moves at most between rows (T,), shape (T - 1,) [m].
-
-    Poses and measured speeds each give a length; the larger counts.
-    """
-    dt, speed = np.diff(t), np.abs(twist)
-    speed = np.maximum(speed[:-1], speed[1:])
-    turned = np.abs(wrap_angle(np.diff(pose[:, 2])))
-    return np.maximum(segment_lengths(pose[:, :2]), speed[:, 0] * dt) + radius * np.maximum(turned, speed[:, 1] * dt)
+def _tracks(rollout: Rollout, movers: Trajectories) -> tuple[Track, World, list[Track]]:
+    """Return the track of the robot, its world, and the tracks of the movers."""
+    t, record = _clock(rollout), rollout.record
+    robot = Track.measured(t, rollout.pose, rollout.twist, record.robot.footprint)
+    travel, jumps, still = movers.travel(t), movers.jumps(t), np.zeros((len(t), 1))
+    others = [
+        Track(t, np.hstack([rollout.movers[:, m], still]), Footprint.disc(radius), travel[:, m], jumps[:, m])
+        for m, radius in enumerate(movers.radii.tolist())
+    ]
+    return robot, record.world, others
 
 
 def _clock(rollout: Rollout) -> Floats:
@@ -458,7 +361,7 @@ def _gaps(rollout: Rollout) -> Floats:
     """Return the distance from the footprint to each cylinder, mover and wall, numbered as contacts, shape (T, N) [m]."""
     world, foot, pose = rollout.record.world, rollout.record.robot.footprint, rollout.pose
     radii = np.array([mover.radius for mover in world.movers])
-    standing = _to_discs(foot, pose, world.discs[None, :, :2], world.discs[:, 2])
+    standing = to_discs(foot, pose, world.discs[None, :, :2], world.discs[:, 2])
     return np.concatenate(
-        [standing, _to_discs(foot, pose, rollout.movers, radii), _to_walls(foot, pose, world.bounds)], axis=1
+        [standing, to_discs(foot, pose, rollout.movers, radii), to_walls(foot, pose, world.bounds)], axis=1
     )

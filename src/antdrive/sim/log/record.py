@@ -52,7 +52,7 @@ MARGIN_ROUNDING = 1e-9  # [m]
 FROM_OUTSIDE = "Session"
 
 
-class Proof(Enum):
+class Evidence(Enum):
     """Check of a value in a log: the first level of `antdrive verify` that recomputes or compares it."""
 
     LOG = "verify"  # recomputed from the log alone
@@ -64,9 +64,9 @@ class Proof(Enum):
 
 
 #: Declarations of a field's check.
-LOGGED, OF_WORLD, OF_ROBOT = {"proof": Proof.LOG}, {"proof": Proof.WORLD}, {"proof": Proof.ROBOT}
-REPLAYED = {"proof": Proof.REPLAY}
-CHOSEN, CLAIMED = {"proof": Proof.INPUT}, {"proof": Proof.CLAIM}
+LOGGED, OF_WORLD, OF_ROBOT = {"proof": Evidence.LOG}, {"proof": Evidence.WORLD}, {"proof": Evidence.ROBOT}
+REPLAYED = {"proof": Evidence.REPLAY}
+CHOSEN, CLAIMED = {"proof": Evidence.INPUT}, {"proof": Evidence.CLAIM}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -515,8 +515,9 @@ def settings_of(values: Any) -> dict[str, Any]:
 
 
 def options_of(component: Any) -> dict[str, Any]:
-    """Return the options of a planner or controller as plain values; none if it is no record."""
-    return settings_of(component) if dataclasses.is_dataclass(component) else {}
+    """Return the options of a planner or controller as plain values, without those of places; none if it is no record."""
+    options = settings_of(component) if dataclasses.is_dataclass(component) else {}
+    return {key: value for key, value in options.items() if key not in getattr(component, "places", ())}
 
 
 def changes(values: Any, usual: Any) -> dict[str, Any]:
@@ -585,7 +586,7 @@ def _shown(value: Any) -> str:
         return "a number too long"
 
 
-def proofs_of(kind: type[Any], prefix: str = "") -> Iterator[tuple[str, Proof]]:
+def proofs_of(kind: type[Any], prefix: str = "") -> Iterator[tuple[str, Evidence]]:
     """Yield the check of every value that a record declares, by its dotted key.
 
     Raises:
@@ -602,7 +603,7 @@ def proofs_of(kind: type[Any], prefix: str = "") -> Iterator[tuple[str, Proof]]:
         else:
             yield key, field.metadata["proof"]
             if typing.get_origin(hint) is None and isinstance(hint, type) and issubclass(hint, Task | RobotSpec):
-                yield from ((f"{key}.{label}", Proof.CLAIM) for label in LABELS)
+                yield from ((f"{key}.{label}", Evidence.CLAIM) for label in LABELS)
 
 
 #: Keys of the record that describe how the drive was planned and driven.
@@ -612,7 +613,7 @@ DRIVEN_WITH = (
 )
 LABELS = ("name", "source")  # of worlds and robots, which no comparison reads
 #: Check of every value of the record, by its dotted key; `antdrive.sim.log.rollout.FORMS` has those of the arrays.
-PROOFS: Mapping[str, Proof] = MappingProxyType(dict(proofs_of(DriveRecord)))
+PROOFS: Mapping[str, Evidence] = MappingProxyType(dict(proofs_of(DriveRecord)))
 
 
 def hashes_of(record: DriveRecord) -> dict[str, str]:

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +30,7 @@ from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.files import format_size, open_regular
 from antdrive.base.types import Floats
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import DriveRecord, Proof
+from antdrive.sim.log.record import DriveRecord, Evidence
 from antdrive.worlds.limits import MAX_LOG_DISTANCES, MAX_LOG_WALK, MAX_NEAR_DISTANCES
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
@@ -178,19 +178,19 @@ class ArrayForm(NamedTuple):
 
     shape: tuple[int | str | None, ...]  # None for any length
     dtype: str
-    proof: Proof = Proof.REPLAY  # how it is checked
+    proof: Evidence = Evidence.REPLAY  # how it is checked
 
 
 #: Form of each array.
 FORMS: Mapping[str, ArrayForm] = MappingProxyType(
     {
-        "t": ArrayForm((ROWS,), "<f8", Proof.LOG),
+        "t": ArrayForm((ROWS,), "<f8", Evidence.LOG),
         "pose": ArrayForm((ROWS, 3), "<f8"),
         "twist": ArrayForm((ROWS, 2), "<f8"),
         "command": ArrayForm((ROWS, 2), "<f8"),
-        "clearance": ArrayForm((ROWS,), "<f8", Proof.LOG),
+        "clearance": ArrayForm((ROWS,), "<f8", Evidence.LOG),
         "limiter": ArrayForm((ROWS,), "u1"),
-        "movers": ArrayForm((ROWS, None, 2), "<f8", Proof.LOG),
+        "movers": ArrayForm((ROWS, None, 2), "<f8", Evidence.LOG),
         "contacts": ArrayForm((None, 4), "<f8"),
         "route": ArrayForm((None, 2), "<f8"),
         "cells": ArrayForm((None, 2), "<i4"),
@@ -256,6 +256,8 @@ class Rollout:
     seen: npt.NDArray[np.float32] = field(default_factory=_none_of("seen"))
     tracks: npt.NDArray[np.float32] = field(default_factory=_none_of("tracks"))
     record: DriveRecord
+
+    measured: ClassVar[frozenset[str] | None] = None  # names of the metrics that the log tells; None: all
 
     @property
     def outcome(self) -> Outcome:
@@ -336,6 +338,10 @@ class Rollout:
             arrays: dict[str, Any] = {name: np.ascontiguousarray(getattr(self, name)) for name in self._written}
             np.savez_compressed(file, record=np.array(text), **arrays)
         return target
+
+    def write_proof(self, folder: Path) -> dict[str, str]:
+        """Write the log into a test's folder; return the file by kind."""
+        return {"rollout": str(self.save(folder / "rollout.npz"))}
 
     @classmethod
     def load(cls, path: str | Path) -> Rollout:
