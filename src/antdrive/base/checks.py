@@ -273,11 +273,11 @@ def _as_number(value: Any) -> str:
     return f" (text); write {right}"
 
 
-def pair(text: str, option: str = "--set") -> tuple[str, str]:
+def pair(text: str, option: str = "--set", form: str = "KEY=VALUE") -> tuple[str, str]:
     """Parse KEY=VALUE of `--set` or a similar option."""
     key, mark, value = text.partition("=")
     if not mark or not key:
-        raise InputError(f"{option} {text}: must be KEY=VALUE")
+        raise InputError(f"{option} {text}: must be {form}")
     return key.strip(), value.strip()
 
 

@@ -22,7 +22,9 @@ from antdrive.base.errors import FieldError, InputError, visible
 from antdrive.base.guarded import OverLimit, UserCode, error_text, one_line, place
 from antdrive.base.records import meanings_of
 from antdrive.base.user_code import (
+    DIGITS,
     LOADED,
+    is_plan_file,
     is_user_code,
     module_hash,
     record_name,
@@ -49,6 +51,7 @@ class Registry(Generic[Component]):
         calls: the number of arguments of each method
         base: a class whose subclasses must make all their options fields
         reserved: names in records that no class may have
+        of_file: the class of components that are a plan's file, with options `file` and `digest`
     """
 
     error: type[ComponentError]
@@ -58,6 +61,7 @@ class Registry(Generic[Component]):
     calls: Mapping[str, tuple[str, ...]]
     base: type = object
     reserved: tuple[str, ...] = ()
+    of_file: Callable[[], Component] | None = None
 
     @property
     def kind(self) -> str:
@@ -68,8 +72,8 @@ class Registry(Generic[Component]):
         """Return the named component with options set.
 
         Args:
-            name: a registered name, or FILE.py:CLASS or MODULE:CLASS for user code
-            home: folder of user code; None: the working directory
+            name: a registered name, FILE.py:CLASS or MODULE:CLASS for user code, or a plan's file
+            home: folder of user code and of plans; None: the working directory
             options: the component's options by name; values may be text, as from a command line
 
         Raises:
@@ -83,6 +87,8 @@ class Registry(Generic[Component]):
             made = self.known()[name]
         elif (entry := self._plugins().get(name)) is not None:
             made = self._load(entry)
+        elif self.of_file is not None and (is_plan_file(name) or ((home or Path()) / name).is_dir()):
+            made, options = self.of_file(), {"file": str((home or Path()) / name), **options}
         else:
             raise _error(self.kind, _unknown(name, [*self.known(), *self._plugins()], self.kind))
         return self._with_options(name, made, options)
@@ -110,7 +116,7 @@ class Registry(Generic[Component]):
         Args:
             name: its name in the record
             settings: its options
-            given: the component, or FILE.py:CLASS or MODULE:CLASS; None: by its name
+            given: the component, FILE.py:CLASS, MODULE:CLASS or a plan's file; None: by its name
 
         Raises:
             InputError: it cannot be found, or has another name.
@@ -119,6 +125,8 @@ class Registry(Generic[Component]):
             return self.load(self.registered_name(name), **settings)
         if not isinstance(given, str):
             return given
+        if self.of_file is not None and is_plan_file(given):
+            return self.load(given, **settings)
         if record_name(given) not in (given, name):
             raise InputError(f"{self.kind}: the log's {self.kind} is {name!r:.60}, not {record_name(given)!r:.60}")
         if not is_user_code(given):
@@ -152,8 +160,10 @@ class Registry(Generic[Component]):
             return user_code_version(name, self.error)
         if name in self.known():
             return f"antdrive {__version__}"
-        self.load(name)
-        entry = self._plugins()[name]
+        made: Any = self.load(name)
+        entry = self._plugins().get(name)
+        if entry is None:
+            return f"{record_name(name)} {made.digest[:DIGITS]}"
         version = entry.dist.version if entry.dist is not None else "without version"
         return f"{_maker(entry)} {version} {module_hash(entry.module)}".rstrip()
 

@@ -11,11 +11,12 @@ import importlib.machinery
 import importlib.util
 import inspect
 import os
+import re
 import sys
 import traceback
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import CodeType, ModuleType
 from typing import Any
 
@@ -29,6 +30,8 @@ FROZEN_BASE = "cannot inherit non-frozen dataclass"  # message of Python about a
 DIGITS = 8  # hexadecimal digits of a file's hash
 FROM_FILE = "_antdrive_user_"  # name prefix of modules loaded from files
 
+#: Suffixes of files that hold plans.
+PLAN_SUFFIXES = (".csv", ".txt", ".geojson", ".json", ".mcap", ".db3", ".bag")
 #: Users' classes that this process has loaded, by their kinds and names in records; the latest of a name.
 LOADED: dict[tuple[str, str], Any] = {}
 #: The words that named users' code, by class: FILE.py:CLASS or MODULE:CLASS, seen from the working directory.
@@ -45,12 +48,35 @@ class _Unusable(FieldError):
 
 def is_user_code(name: str) -> bool:
     """Return whether a component's name refers to a file or module instead of the registry."""
-    return ":" in name or name.endswith(".py")
+    return (":" in name or name.endswith(".py")) and not is_plan_file(name)
+
+
+def file_and_topic(name: str) -> tuple[str, str]:
+    """Return the file and the topic of FILE:/TOPIC; the topic is empty without one."""
+    found = re.search(r":(/[\w/]+)$", name)
+    return (name[: found.start()], found[1]) if found else (name, "")
+
+
+def is_plan_file(name: str) -> bool:
+    """Return whether a name refers to a plan's file: by its suffix, as FILE:/TOPIC, or as a folder, by its slash."""
+    file, topic = file_and_topic(name)
+    is_folder = "/" in file and ":" not in file and not file.endswith(".py")
+    return bool(topic) or is_folder or PurePath(file).suffix.lower() in PLAN_SUFFIXES
+
+
+def file_and_rest(name: str) -> tuple[str, str]:
+    """Return the file of a component's name, and the rest that names a class or topic in it; no file for other names."""
+    if not is_plan_file(name):
+        source, mark, word = name.rpartition(":")
+        return (source, f"{mark}{word}") if source.endswith(".py") else ("", name)
+    file, topic = file_and_topic(name)
+    return file.rstrip("/"), f":{topic}" if topic else "" if PurePath(file).suffix else "/"
 
 
 def record_name(name: str) -> str:
-    """Return a component's name in records and tables: the registered name, or the class name in user code."""
-    return name.rpartition(":")[2]
+    """Return a component's name in records and tables: the registered name, the class of user code, or a plan's file."""
+    file, topic = file_and_topic(name)
+    return PurePath(file.rpartition(":")[2]).name + topic.replace("/", "-")
 
 
 def label_names(names: Sequence[str], taken: Collection[str] = ()) -> list[str]:

@@ -162,8 +162,10 @@ def _margin(text: str) -> float | str:
 World = Annotated[str, argument("WORLD", "World name or file.")]
 Log = Annotated[Path, argument("ROLLOUT", "Log of a drive, or folder of a run.")]
 Robot = Annotated[str, option("NAME", "Robot name or file.", panel="Robot")]
-Planner = Annotated[str, option("NAME", "Planner name or FILE.py:CLASS.", panel="Planner")]
-LogPlanner = Annotated[str | None, option("FILE.py:CLASS", "Class of the log's planner, if not registered.")]
+Planner = Annotated[str, option("NAME", "Planner name, FILE.py:CLASS or a plan's file.", panel="Planner")]
+LogPlanner = Annotated[
+    str | None, option("FILE.py:CLASS", "Class of the log's planner, if not registered, or its plan's file.")
+]
 LogController = Annotated[str | None, option("FILE.py:CLASS", "Class of the log's controller, if not registered.")]
 Out = Annotated[Path | None, option("FOLDER", "Output folder.  [default: a folder in out/]", panel="Output")]
 Prelude = Annotated[

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,6 +61,13 @@ def xacro(arguments: list[str] | None, packages: list[str] | None) -> dict[str, 
 
     folders = checked_packages(dict(pair(word, "--package") for word in packages or ()))
     return {"arguments": dict(pair(word, "--arg") for word in arguments or ()), "packages": folders}
+
+
+def namespace(text: str) -> str:
+    """Parse a ROS namespace; returns it with a leading slash."""
+    if not re.fullmatch(r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*/?", text, re.ASCII):
+        raise InputError(f"--namespace {text}: must be a ROS namespace, such as robot1")
+    return f"/{text.strip('/')}"
 
 
 def size(text: str) -> tuple[int, int]:

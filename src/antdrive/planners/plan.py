@@ -8,7 +8,7 @@ import enum
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, cast, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeAlias, cast, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -321,6 +321,7 @@ class Capabilities:
             planners the robot follows the route
         deterministic: draws no random numbers, so every seed gives the same plan
         turns: plans on grids with turns, for the robot's footprint; other planners plan for the disc around it
+        exact_line: its line is driven as it is, whatever the smoothing
     """
 
     complete: bool = True
@@ -331,6 +332,7 @@ class Capabilities:
     cell_by_cell: bool = False
     deterministic: bool = False
     turns: bool = False
+    exact_line: bool = False
 
 
 @runtime_checkable
@@ -366,6 +368,8 @@ class GridPlanner(abc.ABC):
     It checks both ends, and records the planning time, without the compilation of kernels, and the options.
     """
 
+    places: ClassVar[tuple[str, ...]] = ()  # options that say where a file is; records omit them
+
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities and requirements of this planner."""
@@ -379,7 +383,7 @@ class GridPlanner(abc.ABC):
             wall_s = spent()
         if not isinstance(result, PlanResult):  # a user's `search`; `request_plan` refuses it
             return cast(PlanResult, result)
-        options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name not in self.places}
         return dataclasses.replace(result, options=options, wall_s=wall_s)
 
     def untimed(self, query: Query, rng: np.random.Generator) -> PlanResult:

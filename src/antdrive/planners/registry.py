@@ -20,6 +20,7 @@ from antdrive.planners.graph.incremental import DStar, DStarLite
 from antdrive.planners.graph.search import AStar, Dijkstra
 from antdrive.planners.graph.sipp import SafeIntervals
 from antdrive.planners.plan import GridPlanner, Planner
+from antdrive.planners.planfile import PlanFile
 
 #: The built-in planners.
 PLANNERS: Mapping[str, Planner] = MappingProxyType(
@@ -48,7 +49,7 @@ def _lacks(planner: Any) -> str:
 
 #: Planners by name.
 REGISTRY: Registry[Planner] = Registry(
-    PlannerError, PLANNER_GROUP, lambda: PLANNERS, _lacks, {"plan": ("query", "rng")}, GridPlanner
+    PlannerError, PLANNER_GROUP, lambda: PLANNERS, _lacks, {"plan": ("query", "rng")}, GridPlanner, of_file=PlanFile
 )
 
 

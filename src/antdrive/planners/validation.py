@@ -12,18 +12,11 @@ import numpy as np
 
 from antdrive.base import Floats
 from antdrive.base.guarded import one_line, value_text
-from antdrive.base.plane import format_point, polyline_length, segment_lengths, wrap_angle
+from antdrive.base.plane import arc_lengths, format_point, format_position, polyline_length, segment_lengths, wrap_angle
 from antdrive.planners.errors import PlannerError, place_of, planner_errors
-from antdrive.planners.plan import (
-    Cell,
-    History,
-    Planner,
-    PlanResult,
-    PlanStatus,
-    Query,
-    TimedPlan,
-)
+from antdrive.planners.plan import Cell, History, Planner, PlanResult, PlanStatus, Query, TimedPlan
 from antdrive.worlds.route import end_reach, longest_line
+from antdrive.worlds.world import Task, obstacle_name
 
 RELATIVE = 1e-9  # relative tolerance of costs and lengths
 NEAR = 1e-6  # tolerance of waypoints and clearances [m]
@@ -62,9 +55,12 @@ def require_result(planner: Planner, answer: Any, name: str = "") -> PlanResult:
     return cast(PlanResult, answer)
 
 
-def validated(query: Query, answer: PlanResult) -> PlanResult:
-    """Return the planner's answer if it is valid, else one without a path, with status `INVALID` and the reason."""
-    problem = validate_plan(query, answer)
+def validated(query: Query, answer: PlanResult, radius: float = 0.0) -> PlanResult:
+    """Return the planner's answer if it is valid, else one without a path, with status `INVALID` and the reason.
+
+    For `answer` and `radius` see `validate_plan`.
+    """
+    problem = validate_plan(query, answer, radius)
     if not problem:
         # Copied: the planner may reuse its arrays.
         copies: dict[str, Any] = {key: np.array(getattr(answer, key)) for key in _arrays(answer)}
@@ -82,14 +78,15 @@ def _arrays(answer: PlanResult) -> list[str]:
     return [field.name for field in dataclasses.fields(answer) if isinstance(getattr(answer, field.name), np.ndarray)]
 
 
-def validate_plan(query: Query, result: PlanResult) -> str:
+def validate_plan(query: Query, result: PlanResult, radius: float = 0.0) -> str:
     """Return the first error in the `result` of a planner and its place; empty if the plan is valid.
 
     Cells run from start to goal along allowed moves; their cost is that of `path_cost`. Waypoints join the same ends
     and keep the clearance; `length` is that of a curve that rounds their corners. From a start with less clearance,
-    the first leg comes no closer within `end_reach`. Waypoints are no longer than `longest_line` allows for their
+    they come no closer within `end_reach`. Waypoints are no longer than `longest_line` allows for their
     cells. A plan with waypoints may have an infinite cost: the grid has no path, and the cells are those under
     the line. The times of a `TimedPlan` increase. Paths of plans that stopped early are checked as well.
+    A robot's `radius` [m], if known, tells what it would touch from what lacks its margin alone.
     """
     problem = _types(result) or _figure_data(query, result)
     if problem:
@@ -107,7 +104,7 @@ def validate_plan(query: Query, result: PlanResult) -> str:
         return f"cells: given, but {query.blocked_end}"
     problem = _cells(query, result, off_grid)
     if not problem and result.waypoints is not None:
-        problem = _waypoints(query, result, query.grid.xy(result.waypoints))
+        problem = _waypoints(query, result, query.grid.xy(result.waypoints), radius)
     elif not problem and result.length is not None and not _same(result.length, result.cost):
         problem = f"length: {result.length:.9g} m, but the cells are {result.cost:.9g} m long"
     if not problem and isinstance(result, TimedPlan):
@@ -235,20 +232,14 @@ def _cell(cell: Any) -> str:
     return f"({int(cell[0])}, {int(cell[1])})"
 
 
-def _waypoints(query: Query, result: PlanResult, xy: Floats) -> str:
+def _waypoints(query: Query, result: PlanResult, xy: Floats, radius: float) -> str:
     """Return the first error in a plan's line (M, 2) [m]: its ends, clearance or length; or empty."""
     length = result.length
     assert length is not None
-    for k, key, ends in zip((0, -1), ("start", "goal"), _ends(query), strict=True):
-        if min(math.dist(xy[k], end) for end in ends) > NEAR:
-            return f"waypoints: the {'first' if k == 0 else 'last'} is not at the {key}"
-    if len(xy) > 1:
-        close = _too_close(query, xy)
-        if close.any():
-            k = int(close.argmax())
-            begin, end = (format_point(xy[i].tolist(), 3) for i in (k, k + 1))
-            keeps = f"{query.grid.inflate:g} m from obstacles" if query.task is not None else "to free cells"
-            return f"waypoints: step {k} from {begin} to {end} does not keep {keeps}"
+    starts, goals = _ends(query)
+    problem = _off(xy[0], starts, "first is not at the start") or _too_near(query, xy, radius)
+    if problem := problem or _off(xy[-1], goals, "last is not at the goal"):
+        return f"waypoints: {problem}"
     drawn = polyline_length(xy)
     slack = RELATIVE * drawn + NEAR
     if not drawn - _rounded_off(xy) - slack <= length <= drawn + slack:
@@ -267,34 +258,69 @@ def _leads(query: Query, result: PlanResult) -> float:
 
 
 def _ends(query: Query) -> list[list[tuple[float, float]]]:
-    """Return the points where a line may begin and those where it may end: cell centres and exact ends."""
+    """Return the points where a line may begin and those where it may end: exact ends and cell centres."""
     cells = [[(float(x), float(y))] for x, y in query.grid.xy([query.start, query.goal])]
     if query.task is not None:
         # Without a usable start cell, the line must begin at the exact start.
         cells[0] = [query.task.start[:2], *([] if query.blocked_end else cells[0])]
-        cells[1].append(query.task.goal)
+        cells[1].insert(0, query.task.goal)
     return cells
 
 
-def _too_close(query: Query, xy: Floats) -> Any:
-    """Return which segments of a line (M, 2) [m] violate the clearance (M - 1,)."""
+def _off(point: Floats, ends: list[tuple[float, float]], what: str) -> str:
+    if min(math.dist(point, end) for end in ends) <= NEAR:
+        return ""
+    return f"the {what}: {format_point(point.tolist(), 3)} is {math.dist(point, ends[0]):.3g} m away"
+
+
+def _too_near(query: Query, xy: Floats, radius: float) -> str:
+    """Return the first step of a line (M, 2) [m] that violates the clearance, by how much and where; or empty."""
+    wrong = np.flatnonzero((lacks := _lacking(query, xy)) > NEAR) if len(xy) > 1 else np.empty(0)
+    if not len(wrong):
+        return ""
+    k = int(wrong[0])
+    step = f"step {k} from {format_point(xy[k].tolist(), 3)} to {format_point(xy[k + 1].tolist(), 3)} does not keep"
+    if query.task is None:
+        return f"{step} to free cells"
+    where = _nearest(query.task, xy[k : k + 2], lacks[k], radius)
+    return f"{step} {query.grid.inflate:g} m from obstacles: {where}"
+
+
+def _nearest(task: Task, ends: Floats, lack: float, radius: float) -> str:
+    """Describe the obstacle or wall next to a segment (2, 2) [m] that lacks some clearance, and whether a robot touches it."""
+    world, along = task.world, ends[1] - ends[0]
+    discs, (xmin, ymin, xmax, ymax) = world.discs, world.bounds
+    share = np.clip((discs[:, :2] - ends[0]) @ along / max(float(along @ along), 1e-18), 0.0, 1.0)
+    points = ends[0] + share[:, None] * along
+    walls = np.stack([ends - (xmin, ymin), (xmax, ymax) - ends], axis=1).reshape(2, 4)
+    gaps = np.concatenate([np.hypot(*(points - discs[:, :2]).T) - discs[:, 2], walls.min(axis=0)])
+    k = int(gaps.argmin())
+    x, y = points[k] if k < len(discs) else ends[walls[:, k - len(discs)].argmin()]
+    spare = float(gaps[k]) - radius
+    robot = f"; the robot's disc of {radius:.3g} m {f'clears it by {spare:.3f} m' if spare > 0 else 'touches it'}"
+    return f"at {format_position(task.frame, x, y)}, {lack:.3f} m too near {obstacle_name(world, k)}{robot if radius else ''}"
+
+
+def _lacking(query: Query, xy: Floats) -> Floats:
+    """Return by how much each segment of a line (M, 2) violates the clearance (M - 1,) [m]; infinite on a grid without world."""
     task, inflate = query.task, query.grid.inflate
     if task is None:
         from antdrive.planners.anyangle.lines import clear_line
 
         pairs = zip(xy[:-1].tolist(), xy[1:].tolist(), strict=True)
-        return np.array([not clear_line(query, tuple(a), tuple(b)) for a, b in pairs])
+        return np.array([-math.inf if clear_line(query, tuple(a), tuple(b)) else math.inf for a, b in pairs])
     from antdrive.worlds.geometry import point_clearance, segment_clearance  # imports the compiler
 
-    keep = np.full(len(xy) - 1, inflate)
-    # A start below the clearance: the first segment must not come closer.
-    keep[0] = min(inflate, float(point_clearance(task.world, xy[:1])[0]))
-    close = segment_clearance(task.world, xy[:-1], xy[1:]) < keep - NEAR
-    fraction = end_reach(inflate, query.grid.cell) / max(math.dist(xy[0], xy[1]), 1e-9)
-    if fraction < 1:
-        away = xy[:1] + fraction * (xy[1:2] - xy[:1])
-        close[0] |= segment_clearance(task.world, away, xy[1:2])[0] < inflate - NEAR
-    return close
+    clearance = segment_clearance(task.world, xy[:-1], xy[1:])
+    lacks, own, arc = inflate - clearance, float(point_clearance(task.world, xy[:1])[0]), arc_lengths(xy)
+    leaving = int(np.searchsorted(arc, end_reach(inflate, query.grid.cell)))  # first point beyond
+    if own < inflate:  # near such a start, no segment may come closer than the start itself
+        lacks[:leaving] = own - clearance[:leaving]
+        if leaving < len(xy):
+            k, step = leaving - 1, arc[leaving] - arc[leaving - 1]
+            away = xy[k] + (end_reach(inflate, query.grid.cell) - arc[k]) / step * (xy[leaving] - xy[k])
+            lacks[k] = max(lacks[k], inflate - segment_clearance(task.world, [away], xy[leaving : leaving + 1])[0])
+    return lacks
 
 
 def _rounded_off(xy: Floats) -> float:

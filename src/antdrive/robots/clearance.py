@@ -12,12 +12,12 @@ from antdrive.base.plane import format_disc
 from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.worlds import Disc, World
 from antdrive.worlds.motions import first_place
+from antdrive.worlds.world import obstacle_name
 
 if TYPE_CHECKING:
     from antdrive.worlds.headings import Outline
 
 TOUCHING = 1e-4  # surfaces closer than this touch [m]
-WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
 
 
 def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike) -> Floats:
@@ -82,16 +82,6 @@ def _beyond_polygon(footprint: Footprint, x: Floats, y: Floats) -> Floats:
         apart = np.minimum(apart, np.hypot(x - ax - along * ex, y - ay - along * ey))
         over = np.maximum(over, (x - ax) * ey - (y - ay) * ex if length else np.inf)
     return np.where(over <= 0, over, apart)
-
-
-def obstacle_name(world: World, index: int, unseen: int = 0) -> str:
-    """Return the name of an obstacle or a wall for messages."""
-    count = len(world.obstacles)
-    if index >= count:
-        return WALLS[index - count]
-    disc, known = world.obstacles[index], count - unseen
-    key = f"obstacles[{index}]" if index < known else f"unseen[{index - known}]"
-    return f"{key} {format_disc(disc.x, disc.y, disc.radius)}"
 
 
 def overlap_at(world: World, spec: RobotSpec, pose: Pose, unseen: tuple[Disc, ...] = ()) -> str:

@@ -13,9 +13,9 @@ Idle: TypeAlias = Callable[[Scenario, str], str]
 
 
 def if_timed(s: Scenario, key: str) -> str:
-    """Return a reason for a planner whose cells are driven as planned, at its times."""
-    as_asked = s.smoothing == s.driven_smoothing
-    return "" if as_asked else f"{s.planner_label} plans in space and time; its cells are driven as planned"
+    """Return a reason for a planner whose line is driven as planned."""
+    why = "plans in space and time; its cells are" if s.timed else "is a plan of a file; its line is"
+    return "" if s.smoothing == s.driven_smoothing else f"{s.planner_label} {why} driven as planned"
 
 
 def without_noise(s: Scenario, key: str) -> str:

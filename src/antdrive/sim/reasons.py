@@ -14,11 +14,11 @@ from antdrive.base.plane import format_number, format_position
 from antdrive.planners import AStar, Query, is_built_in
 from antdrive.planners.graph.search import reachable
 from antdrive.planners.plan import within_goal
-from antdrive.robots.clearance import obstacle_name
 from antdrive.robots.default_margin import LEAST
 from antdrive.worlds import Grid
 from antdrive.worlds.passage import Passage, feasible, widest_passage
 from antdrive.worlds.route import end_reach
+from antdrive.worlds.world import obstacle_name
 
 if TYPE_CHECKING:
     from antdrive.robots import RobotSpec

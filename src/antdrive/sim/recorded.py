@@ -137,6 +137,8 @@ def rebuilt(
     from antdrive.robots.controllers.registry import REGISTRY as CONTROLLER_REGISTRY
     from antdrive.sim.scenario import Scenario
 
+    if planner is None and record.planner.settings.keys() == {"digest"}:
+        planner = written_of(record).planner  # the file of a plan
     name = record.planner.name if planner is not None else registered_name(record.planner.name)
     made: dict[str, Any] = {"task": record.task, "robot": record.robot, "planner_name": name}
     made["planner"] = REGISTRY.of_record(record.planner.name, record.planner.settings, planner)

@@ -162,10 +162,10 @@ class Scenario(Settings):
                 f"exact: {self.planner_label} plans for the disc around the robot{among}; `antdrive planners` lists those that "
                 "plan for its footprint",
             )
-        if self.mapless and can.needs_motions:
-            raise FieldError(
-                "map", f"none: {self.planner_label} needs ground-truth motions of movers, which a mapless robot lacks"
-            )
+        if self.mapless and (can.needs_motions or can.exact_line):
+            needs = "needs ground-truth motions of movers, which a mapless robot lacks"
+            problem = "is one plan, but a mapless robot replans" if can.exact_line else needs
+            raise FieldError("map", f"none: {self.planner_label} {problem}")
 
     @classmethod
     def of(
@@ -183,7 +183,7 @@ class Scenario(Settings):
 
         Args:
             world: a world of the catalogue, a world file, or a task
-            planner: a planner's name, FILE.py:CLASS, MODULE:CLASS, or a planner
+            planner: a planner's name, FILE.py:CLASS, MODULE:CLASS, a plan's file, or a planner
             robot: a robot of the catalogue, a robot file, or a specification
             options: options of a planner given by name
             settings: fields of `Scenario`, such as noise=1.0; the controller may be a name, or a mapping as in files
@@ -277,10 +277,7 @@ class Scenario(Settings):
         if type(self.controller) is not PurePursuit:
             own = {} if is_built_in(self.controller) else {"file": module_hash(type(self.controller).__module__)}
             fields["controller"] = {"name": self.controller_label, **options_of(self.controller), **own}
-        parts = {
-            "planner": self.planner_label,
-            "options": options_of(planner),
-        }
+        parts = {"planner": self.planner_label, "options": options_of(planner)}
         parts |= {name: canonical_hash(getattr(self, name)) for name in ("task", "robot") if name not in known}
         return json.dumps({**parts, **known, "settings": settings_of(part_of_key(fields))}, sort_keys=True)
 
@@ -288,6 +285,11 @@ class Scenario(Settings):
     def key(self) -> str:
         """Hash of everything that the drive depends on."""
         return key_of(self.identity(), self.seed)
+
+    @property
+    def sources(self) -> Mapping[str, str]:
+        """Hashes by name of what it consists of besides, or instead."""
+        return {}
 
     @property
     def loss_factors(self) -> LossFactors:
@@ -448,8 +450,8 @@ class Scenario(Settings):
 
     @property
     def driven_smoothing(self) -> str:
-        """Kind of smoothing of the driven routes: none for plans in space and time."""
-        return "none" if self.timed else self.smoothing
+        """Kind of smoothing of the driven routes: none for plans in space and time, and for plans of files."""
+        return "none" if self.timed or capabilities_of(self.planner).exact_line else self.smoothing
 
     @property
     def usual_perception(self) -> Perception:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from antdrive.base.checks import resolve, show, suggest
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import file_name
+from antdrive.base.user_code import file_and_rest
 from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ class Written:
         task: one of the world's tasks; None: its own start and goal
         start: another start [x, y, yaw], in metres and radians
         goal: another goal [x, y], in metres
-        planner: a registered name, FILE.py:CLASS, or MODULE:CLASS
+        planner: a registered name, FILE.py:CLASS, MODULE:CLASS, or a plan's file
         options: the planner's options
         robot: a robot of the catalogue, or a robot file
         settings: the settings that are given, by key
@@ -129,7 +130,7 @@ class Written:
                 resolve("world", self.world, list_worlds(), home)
             resolve("robot", self.robot, list_robots(), home)
             if not is_user_code(self.planner):
-                load_planner(self.planner, **self.options)
+                load_planner(self.planner, home, **self.options)
 
     def check_settings(self, at: ErrorAt) -> None:
         """Check the keys and values of settings, without user code; those of the controller load the compiler.
@@ -207,8 +208,8 @@ class Written:
         world = self.world if not isinstance(self.world, str) or self.world in list_worlds() else rename(self.world)
 
         def code(name: str) -> str:
-            source, mark, word = name.rpartition(":")
-            return f"{rename(source)}{mark}{word}" if source.endswith(".py") else name
+            file, rest = file_and_rest(name)
+            return f"{rename(file)}{rest}" if file else name
 
         robot = self.robot if self.robot in list_robots() else rename(self.robot)
         settings = with_controller(self.settings, code)

@@ -20,6 +20,7 @@ from antdrive.worlds.motions import Motion, first_cell, is_within, motion_of, pa
 from antdrive.worlds.movers import Cruising, Mover, Wandering, later
 from antdrive.worlds.svg import card, world_svg
 
+WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
 DRAWN_TIME = 20.0  # length of movers' paths in notebooks [s]
 
 
@@ -284,3 +285,13 @@ class Task:
 def by_geometry(world: World) -> Keyed[World]:
     """Return the world keyed by the bits of its walls and static cylinders; heights do not count."""
     return Keyed(world, (bits(*world.bounds), world.discs.tobytes()))
+
+
+def obstacle_name(world: World, index: int, unseen: int = 0) -> str:
+    """Return the name of an obstacle or a wall for messages."""
+    count = len(world.obstacles)
+    if index >= count:
+        return WALLS[index - count]
+    disc, known = world.obstacles[index], count - unseen
+    key = f"obstacles[{index}]" if index < known else f"unseen[{index - known}]"
+    return f"{key} {format_disc(disc.x, disc.y, disc.radius)}"

@@ -25,7 +25,7 @@ def plan(
 ) -> bool:
     """Plan a path without driving it.
 
-    Exit code 0: a path exists.
+    Exit code 0: a path exists. For a wrong plan (--planner FILE) it prints the first wrong place, and by how much.
     """
     from antdrive.planners import keep_best
     from antdrive.sim.pipeline import plan as make_plan

@@ -27,7 +27,9 @@ def sweep(
     generate: Annotated[
         list[str] | None, option("KIND:SEEDS", "Random worlds: forest:20 or barn:0-9. Repeatable.")
     ] = None,
-    planner: Annotated[list[str] | None, option("NAME", "Planner name or FILE.py:CLASS. Repeatable.")] = None,
+    planner: Annotated[
+        list[str] | None, option("NAME", "Planner name, FILE.py:CLASS or a plan's file. Repeatable.")
+    ] = None,
     settings: Annotated[
         list[str] | None,
         option(

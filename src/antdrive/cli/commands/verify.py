@@ -19,7 +19,8 @@ def verify(
     robot: Annotated[str | None, option("NAME", "Require this robot (name or file) in the logs.")] = None,
     replay: Annotated[bool, flag("Drive the logs again and compare every value.", "--replay")] = False,
     planner: Annotated[
-        str | None, option("FILE.py:CLASS", "Class of the logs' planner, if not registered; with --replay.")
+        str | None,
+        option("FILE.py:CLASS", "Class of the logs' planner, if not registered, or its plan's file; with --replay."),
     ] = None,
     controller: Annotated[
         str | None, option("FILE.py:CLASS", "Class of the logs' controller, if not registered; with --replay.")

@@ -14,18 +14,12 @@ from antdrive.base.checks import resolve, suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, amount
 from antdrive.base.files import file_name
+from antdrive.base.user_code import file_and_rest
 from antdrive.robots import list_robots, load_robot
 from antdrive.robots.controllers.registry import REGISTRY
 from antdrive.runs.campaigns.campaign import AXES, Campaign
 from antdrive.runs.campaigns.job import Job, NamedRobot, NamedTask, PlannerVariant, SweepCase
-from antdrive.runs.campaigns.resolving import (
-    OWN,
-    SKIP,
-    campaign_tasks,
-    campaign_worlds,
-    component_of,
-    planner_variants,
-)
+from antdrive.runs.campaigns.resolving import OWN, SKIP, campaign_tasks, campaign_worlds, component_of, planner_variants
 from antdrive.sim.forms import name_and_options, scenario_fields
 from antdrive.sim.idle_settings import idle_notes
 from antdrive.sim.log.record import canonical_hash
@@ -115,7 +109,7 @@ def expand(campaign: Campaign) -> Expansion:
     names = dict.fromkeys(name_and_options(given.get("controller"))[0] for given, _ in settings)
     controllers = [component_of(name, campaign.folder, REGISTRY) for name in names]
     files_of_code = [(one.word, one.file) for one in planners] + [(one.word, one.file) for one in controllers]
-    codes = {word.rpartition(":")[0]: file for word, file in files_of_code if file is not None}
+    codes = {file_and_rest(word)[0]: file for word, file in files_of_code if file is not None}
     return Expansion(
         tuple(jobs.values()), wanted - len(jobs), counts, files, own, codes, tuple(_remarks(tasks, skipped))
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 from antdrive.base.checks import grouped
 from antdrive.base.errors import InputError
-from antdrive.base.user_code import record_name
+from antdrive.base.user_code import file_and_rest, record_name
 from antdrive.robots import list_robots
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.sim.forms import USUAL_CONTROLLER
@@ -100,8 +100,8 @@ def _absolute_code(entry: Any) -> Any:
     """Return a planner or controller with its file's path, if any, made absolute."""
     if isinstance(entry, dict):
         return {**entry, "name": _absolute_code(entry["name"])}
-    file, mark, word = entry.rpartition(":")
-    return f"{Path(file).absolute()}{mark}{word}" if file.endswith(".py") else entry
+    file, rest = file_and_rest(entry)
+    return f"{Path(file).absolute()}{rest}" if file else entry
 
 
 def _seeds(text: str) -> Any:

@@ -18,7 +18,7 @@ from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import relative
 from antdrive.base.registry import Registry
-from antdrive.base.user_code import label_names
+from antdrive.base.user_code import file_and_rest, label_names
 from antdrive.planners import PLANNERS, Query, capabilities_of, load_planner
 from antdrive.planners.registry import REGISTRY
 from antdrive.robots import PurePursuit, RobotSpec, outline_of, overlap_at
@@ -85,10 +85,7 @@ def _named(campaign: Campaign, place: Location, name: str) -> Iterator[tuple[Nam
         return
     for path in _files(campaign, place, name, f"and no world of the catalogue; {suggest(Path(name).stem, known)}"):
         task = load_task(path)
-        yield (
-            NamedTask(task.world.name, OWN, task, None, place, load_tasks(path)),
-            relative(path, campaign.folder),
-        )
+        yield (NamedTask(task.world.name, OWN, task, None, place, load_tasks(path)), relative(path, campaign.folder))
 
 
 def _files(campaign: Campaign, place: Location, pattern: str, otherwise: str) -> list[Path]:
@@ -171,7 +168,7 @@ class NamedComponent(NamedTuple):
     name: str  # as in the campaign; for a file without its folder
     source: str  # what loads it
     word: str  # its name in commands run in the campaign's folder, which has a copy of its file
-    file: Path | None  # its file; None if registered or in a module
+    file: Path | None  # its file; None if registered, in a module, or a folder
     version: str  # version of its code
 
 
@@ -181,12 +178,14 @@ def component_of(name: str, folder: Path, registry: Registry[Any]) -> NamedCompo
     Raises:
         InputError: it cannot be loaded.
     """
-    file, _, inner = name.rpartition(":")
-    if not file.endswith(".py"):
+    file, rest = file_and_rest(name)
+    if not file:
         return NamedComponent(name, name, name, None, registry.version(name))
     path = (folder / file).absolute()
-    source, name = f"{path}:{inner}", f"{path.name}:{inner}"
+    source, name = f"{path}{rest}", f"{path.name}{rest}"
     version = registry.version(source)
+    if path.is_dir():  # a bag
+        return NamedComponent(name, source, source, None, version)
     return NamedComponent(name, source, f"{registry.kind}s/{version.rpartition(' ')[2]}/{name}", path, version)
 
 
@@ -248,10 +247,7 @@ TRIES = 1000  # most random pairs of start and goal drawn for one task
 
 
 def campaign_tasks(
-    campaign: Campaign,
-    worlds: Sequence[NamedTask],
-    robots: Sequence[RobotSpec],
-    planners: Sequence[PlannerVariant],
+    campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequence[RobotSpec], planners: Sequence[PlannerVariant]
 ) -> Iterator[NamedTask]:
     """Yield the tasks of a campaign: each world with each of its starts and goals."""
     if isinstance(campaign.tasks, RandomTasks):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from antdrive.base import Pose
 from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, footprint_clearance
-from antdrive.robots.clearance import footprint_distances, obstacle_name
+from antdrive.robots.clearance import footprint_distances
 from antdrive.robots.control.observation import REST
 from antdrive.sim.driving.body import Body
 from antdrive.sim.driving.localising import Exact
 from antdrive.sim.driving.plants import Kinematic
 from antdrive.sim.driving.senses import Senses
 from antdrive.worlds import World, point_clearance
+from antdrive.worlds.world import obstacle_name
 
 REHEARSED = 60.0  # limit of the rehearsal; the drive decides what follows [s]
 

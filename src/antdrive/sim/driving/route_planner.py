@@ -175,7 +175,7 @@ class RoutePlanner:
 
     def validated(self, query: Query, answer: PlanResult) -> PlanResult:
         """Return the answer if it is valid; else note the error and return an invalid plan."""
-        plan = validated(query, answer)
+        plan = validated(query, answer, self.robot.radius)
         if plan.solved and query.grid.turns and self.footprint_margin is None:
             self.footprint_margin = max(query.grid.turns.outline.reach - self.robot.footprint.rounding, 0.0)
         if plan.status is PlanStatus.INVALID:

@@ -67,8 +67,9 @@ class Metric:
         return " ".join((inspect.getdoc(self.function) or "").split())
 
     def __call__(self, rollout: Rollout | None) -> float:
-        """Return the metric of one drive."""
-        return self.function(_driven(rollout))
+        """Return the metric of one drive; NaN if its log does not tell it."""
+        driven = _driven(rollout)
+        return self.function(driven) if driven.measured is None or self.name in driven.measured else math.nan
 
 
 def _driven(rollout: Rollout | None) -> Rollout:

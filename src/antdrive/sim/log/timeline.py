@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
 from antdrive.sim.log.rollout import Rollout
+
+
+def speeds(t: Floats, pose: Floats) -> Floats:
+    """Return the forward speed and the yaw rate that lead to each pose (T, 3) from the one before (T, 2) [m/s, rad/s]."""
+    moved, steps = np.diff(pose, axis=0, prepend=pose[:1]), np.diff(t, prepend=t[0] - 1.0)
+    twist = np.column_stack([np.hypot(moved[:, 0], moved[:, 1]), wrap_angle(moved[:, 2])])
+    return np.asarray(twist / np.maximum(steps, 1e-9)[:, None])
 
 
 class Timeline:

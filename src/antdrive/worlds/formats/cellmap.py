@@ -153,7 +153,7 @@ def cover(cells: CellMap, overhang: float | None = None, needed: Cells | None = 
         raise input_error("map", f"has {rows} x {cols} reachable cells; the limit is {MAX_COVERED}")
     report = _report.get() if needed is None else lambda fraction: None  # of a part, nothing is reported
     report(REACHABLE_DONE)
-    needed = _beside(free) & ~free if needed is None else needed
+    needed = beside(free) & ~free if needed is None else needed
     # Treat the map as surrounded by free cells, so that no disc reaches beyond it.
     distance2 = np.empty((2 * free.shape[0] + 5, 2 * free.shape[1] + 5), dtype=np.int32)
     kernels.squared_distances(np.pad(free, 1, constant_values=True), CAP, distance2)
@@ -177,7 +177,7 @@ def cover_inside(blocked: Cells, cell: float, corner: Point, overhang: float, do
     rows, cols = blocked.shape
     padded = np.pad(blocked, ((0, -rows % COARSE), (0, -cols % COARSE)))
     coarse = np.pad(padded.reshape(padded.shape[0] // COARSE, COARSE, -1, COARSE).all(axis=(1, 3)), 1)
-    deep = (coarse & ~_beside(~coarse))[1:-1, 1:-1]
+    deep = (coarse & ~beside(~coarse))[1:-1, 1:-1]
     inner = cover(CellMap(~deep, cell * COARSE, corner), needed=deep)
     rim = blocked & ~deep.repeat(COARSE, 0).repeat(COARSE, 1)[:rows, :cols]
     outer = cover(CellMap(~blocked, cell, corner), overhang, rim)
@@ -185,7 +185,7 @@ def cover_inside(blocked: Cells, cell: float, corner: Point, overhang: float, do
     return Cover(np.vstack([inner.discs, outer.discs]), int(blocked.sum()), outer.overhang)
 
 
-def _beside(cells: Cells) -> Cells:
+def beside(cells: Cells) -> Cells:
     """Return the given cells with their eight neighbours."""
     rows, cols = cells.shape
     padded, near = np.pad(cells, 1), np.zeros_like(cells)
@@ -301,7 +301,7 @@ def largest_ground(cells: CellMap, most: int = MOST_EROSIONS) -> tuple[Pose, Poi
     if np.count_nonzero(largest) < 2:
         raise input_error("map", "has no two connected free cells")
     for _ in range(most):
-        inner = ~_beside(~np.pad(largest, 1))[1:-1, 1:-1]
+        inner = ~beside(~np.pad(largest, 1))[1:-1, 1:-1]
         if np.count_nonzero(inner) < 2:
             break
         largest = inner
