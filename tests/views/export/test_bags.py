@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -16,9 +17,11 @@ import pytest
 import yaml
 from rosbags import rosbag2
 
+from antdrive.robots import load_robot
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.sensing import Scanner
-from antdrive.views.export.exporting import export
+from antdrive.views.export.exporting import LAYOUT, export
+from antdrive.views.export.robot_frames import frames_of_spec
 from antdrive.views.export.samples import OMITTED, SIMULATED
 from antdrive.views.export.topics import message_types
 from antdrive.worlds.files.world_file import load_task
@@ -320,3 +323,40 @@ def test_the_layout_shows_topics_that_exist(folder, said):
         for name in path.split(".")[1:]:
             value = getattr(value, name)
     assert set(panels["3D!drive"]["topics"]) <= topics
+
+
+def test_two_robots_in_namespaces_share_nothing_but_the_map(folder, log, said, tmp_path):
+    start, everything = 1_777_887_000_250_000_000, {}
+    for robot in ("/robot1", "/fleet/robot2"):
+        target = tmp_path / f"{robot.rpartition('/')[2]}.mcap"
+        export(folder / "rollout.npz", "mcap", target, start=start, namespace=robot)
+        now = list(by_rosbags(target))
+        assert min(entry.at for entry in now) == start
+        assert sorted(entry.at - start for entry in now) == sorted(entry.at for entry in by_mcap(folder / "drive.mcap"))
+        assert all(nanoseconds(entry.message.header.stamp) == entry.at for entry in of(now, f"{robot}/odom"))
+        tf = [entry for topic in ("tf", "tf_static") for entry in of(now, f"{robot}/{topic}")]
+        frames = {
+            name for e in tf for one in e.message.transforms for name in (one.header.frame_id, one.child_frame_id)
+        }
+        frames |= {marker.header.frame_id for e in of(now, f"{robot}/movers") for marker in e.message.markers}
+        plain = {
+            one.child_frame_id
+            for topic in ("/tf", "/tf_static")
+            for e in of(said, topic)
+            for one in e.message.transforms
+        }
+        assert frames == {"map", *(f"{robot}/{name}"[1:] for name in plain)}
+        assert all(
+            topic.startswith((f'"{robot}/', "//"))
+            for topic in re.findall('"/[^"]*', target.with_suffix(LAYOUT).read_text())
+        )
+        everything[robot] = frames - {"map"} | {entry.topic for entry in now}
+    assert not everything["/robot1"] & everything["/fleet/robot2"]
+
+
+def test_frames_of_a_urdf_keep_their_names_in_a_namespace():
+    own = frames_of_spec(load_robot("turtlebot4"))
+    there = own.under("/robot1")
+    assert [link[:2] for link in there.links] == [(f"robot1/{a}", f"robot1/{b}") for a, b, _ in own.links]
+    assert (there.base, there.scan) == (f"robot1/{own.base}", f"robot1/{own.scan}")
+    assert (there.text, there.joints) == (own.text, own.joints)

@@ -3,14 +3,13 @@
 import functools
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.base.tables import file_lines
-from antdrive.cli import options
+from antdrive.cli import options, parse
 from antdrive.cli.console import show
 from antdrive.cli.options import flag, option
-from antdrive.cli.parse import xacro
 
 
 def export(
@@ -27,6 +26,8 @@ def export(
     right: Annotated[str | None, option("NAME", "Joint or link of its right driven wheel.")] = None,
     arguments: options.XacroArguments = None,
     packages: options.RosPackages = None,
+    start_time: Annotated[int, option("SECONDS", "First stamp, in UNIX time [s].", min=0, max=2**31 - 1)] = 0,
+    namespace: Annotated[str | None, option("NAME", "Prefix of topics and of all frames but map.")] = None,
     json: options.Json = False,
 ) -> None:
     """Export a drive to Foxglove, RViz or CSV.
@@ -44,17 +45,17 @@ def export(
     details = {"left": left, "right": right, "arg": arguments, "package": packages}
     if urdf is None and (key := next((key for key, value in details.items() if value), None)):
         raise InputError(f"--{key}: needs --urdf FILE")
-    if urdf is not None and to == "csv":
-        raise InputError("--urdf: tables hold no robot; use --to mcap or --to rosbag2")
+    of_bags = {"urdf": urdf, "start-time": start_time, "namespace": namespace}
+    if to == "csv" and (key := next((key for key, value in of_bags.items() if value), None)):
+        raise InputError(f"--{key}: tables hold no messages; use --to mcap or --to rosbag2")
     frames: Callable[[RobotSpec], RobotFrames] = frames_of_spec
     if urdf is not None:
         frames = functools.partial(
-            frames_of_urdf,
-            path=urdf,
-            left=left,
-            right=right,
-            **xacro(arguments, packages),
+            frames_of_urdf, path=urdf, left=left, right=right, **parse.xacro(arguments, packages)
         )
-    files = write(log_at(rollout), to, out, replace=force, scans=scans, frames=frames)
+    named: dict[str, Any] = {"namespace": "" if namespace is None else parse.namespace(namespace)}
+    files = write(
+        log_at(rollout), to, out, replace=force, scans=scans, frames=frames, start=start_time * 10**9, **named
+    )
     written = {("layout" if file.name.endswith(".foxglove.json") else to): str(file) for file in files}
     show(json, {"files": written}, file_lines(written))

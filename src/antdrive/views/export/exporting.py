@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,9 +24,10 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.views.export.robot_frames import RobotFrames, frames_of_spec
 from antdrive.views.export.samples import DriveScans, samples
 from antdrive.views.export.scenery import routes_of, scenery
-from antdrive.views.export.topics import Topic, metadata, write_mcap
+from antdrive.views.export.topics import START, Topic, metadata, write_mcap
 from antdrive.worlds.files.world_file import save_task
 
+FOREIGN = ("/tf_static", "/tf", "/clearance", "/map", "/obstacles", "/movers", "/robot_description")  # of foreign logs
 LAYOUT = ".foxglove.json"
 SCENE = "3D!drive"
 MARGIN = 1.1  # shown extent relative to the world's
@@ -40,8 +42,13 @@ def export(
     replace: bool = False,
     scans: bool = True,
     frames: Callable[[RobotSpec], RobotFrames] = frames_of_spec,
+    start: int = 0,
+    namespace: str = "",
 ) -> list[Path]:
-    """Export a log atomically and return the written files or the folder."""
+    """Export a log atomically and return the written files or the folder.
+
+    `start` is the stamp of the first message [ns], `namespace` the prefix of topics and frames, such as /robot1.
+    """
     if to not in EXPORTS:
         raise FieldError("to", f"unknown {to!r}; choose from {', '.join(EXPORTS)}")
     source, target = Path(log), Path(path)
@@ -52,7 +59,11 @@ def export(
         raise input_error(str(target), f"name a folder: {to} writes several files{kind}")
     require_new((target, target.with_suffix(LAYOUT)), replace=replace or to != "mcap")
     rollout = Rollout.load(source)
-    return EXPORTS[to](rollout, source, target, scans, frames(rollout.record.robot))
+    token = START.set(start)
+    try:
+        return EXPORTS[to](rollout, source, target, scans, frames(rollout.record.robot).under(namespace))
+    finally:
+        START.reset(token)
 
 
 def topics_of(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[Topic]:
@@ -62,24 +73,39 @@ def topics_of(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[To
     moving = many[0]
     stamps = np.concatenate([static.stamps, moving.stamps])
     tf = Topic(moving.name, moving.kind, stamps, [*static.payloads, *moving.payloads])
-    return [static, tf, *many[1:], *few]
+    topics = [static, tf, *many[1:], *few]
+    if rollout.measured is not None:
+        topics = [one for one in topics if one.name in FOREIGN]
+    return [dataclasses.replace(one, name=body.namespace + one.name) for one in topics]
 
 
-def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
-    """Return a bag's attachments: media type and content by name."""
+def export_foreign(rollout: Rollout, path: Path) -> dict[str, str]:
+    """Export a foreign log with obstacles, clearance and certificate to an MCAP file, and return the files by kind."""
+    if path.suffix != ".mcap":
+        raise input_error(str(path), "wrong suffix; name a file that ends in .mcap")
+    require_new((path, path.with_suffix(LAYOUT)), replace=False)
+    files = _to_mcap(rollout, None, path, False, frames_of_spec(rollout.record.robot))
+    return dict(zip(("mcap", "layout"), map(str, files), strict=True))
+
+
+def attachments_of(rollout: Rollout, log: Path | None) -> dict[str, tuple[str, bytes]]:
+    """Return a bag's attachments: media type and content by name; of a foreign log, which has no task, only its certificate."""
+    certificate = json.dumps(certify(rollout).as_dict(), indent=2, default=str)
+    proof = {"certificate.json": ("application/json", certificate.encode())}
+    if log is None:
+        return proof
     with tempfile.TemporaryDirectory() as folder:
         save_task(rollout.record.task, Path(folder) / "world.yaml")
         world = read_bytes(Path(folder) / "world.yaml", MAX_BYTES)
-    certificate = json.dumps(certify(rollout).as_dict(), indent=2, default=str)
     return {
         "world.yaml": ("application/yaml", world),
-        "certificate.json": ("application/json", certificate.encode()),
+        **proof,
         "digest.txt": ("text/plain", f"{rollout.record.digest}\n".encode()),
         "rollout.npz": ("application/octet-stream", read_bytes(log, MAX_BYTES)),
     }
 
 
-def _to_mcap(rollout: Rollout, log: Path, target: Path, again: bool, body: RobotFrames) -> list[Path]:
+def _to_mcap(rollout: Rollout, log: Path | None, target: Path, again: bool, body: RobotFrames) -> list[Path]:
     layout = target.with_suffix(LAYOUT)
     with atomic_write(layout) as beside, atomic_write(target) as part:  # both files or neither
         _write_bag(rollout, log, part, beside, again, body)
@@ -95,13 +121,14 @@ def _to_rosbag2(rollout: Rollout, log: Path, target: Path, again: bool, body: Ro
 
 
 def _write_bag(
-    rollout: Rollout, log: Path, bag: Path, layout: Path, again: bool, body: RobotFrames
+    rollout: Rollout, log: Path | None, bag: Path, layout: Path, again: bool, body: RobotFrames
 ) -> tuple[list[Topic], dict[str, str]]:
     """Write a bag and its layout and return its topics and notes."""
     scans = DriveScans.of(rollout, again=again)
     topics, notes = topics_of(rollout, scans, body), {"scans": scans.source}
     write_mcap(bag, topics, attachments_of(rollout, log), notes)
-    layout.write_text(json.dumps(foxglove_layout(rollout), indent=2) + "\n", encoding="utf-8")
+    shown = json.dumps(foxglove_layout(rollout), indent=2).replace('"/', f'"{body.namespace}/')
+    layout.write_text(shown + "\n", encoding="utf-8")
     return topics, notes
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from xml.etree import ElementTree
@@ -40,6 +40,17 @@ class RobotFrames:
     signs: tuple[float, float]  # 1 for a joint that turns about the robot's y axis, -1 about the opposite one
     scan: str  # frame of the scans
     scanner: Floats  # this frame in the frame `base` (4, 4)
+    namespace: str = ""  # prefix of topics and of all frames but `map`, such as /robot1; empty: none
+
+    def frame(self, name: str) -> str:
+        """Return a frame's name with the namespace."""
+        return f"{self.namespace}/{name}".lstrip("/")
+
+    def under(self, namespace: str) -> RobotFrames:
+        """Return the robot in a namespace; the URDF keeps its names, as with the `frame_prefix` of robot_state_publisher."""
+        made = replace(self, namespace=namespace)
+        links = tuple((made.frame(parent), made.frame(child), place) for parent, child, place in self.links)
+        return replace(made, base=made.frame(self.base), scan=made.frame(self.scan), links=links)
 
 
 def frames_of_spec(robot: RobotSpec) -> RobotFrames:

@@ -72,8 +72,9 @@ def samples(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[Topi
     """Return the topics with a message per row of a log or per scan."""
     stamps, frame, measured = nanoseconds(rollout.t), rollout.record.task.frame, odometry_of(rollout)
     truth, believed = world_to_map(frame, rollout.pose), world_to_map(frame, estimates_of(rollout))
-    frames = [(ODOM, body.base), (MAP, ODOM), (MAP, TRUTH)]
-    frames += [(MAP, mover_frame(i)) for i in range(rollout.movers.shape[1])]
+    odom, true = body.frame(ODOM), body.frame(TRUTH)
+    frames = [(odom, body.base), (MAP, odom), (MAP, true)]
+    frames += [(MAP, body.frame(mover_frame(i))) for i in range(rollout.movers.shape[1])]
     still = np.zeros((*rollout.movers.shape[:2], 1))
     movers = world_to_map(frame, np.concatenate([rollout.movers, still], axis=2))
     robot = np.stack([measured.pose, relative_frame(measured.pose, believed), truth], axis=1)
@@ -83,14 +84,14 @@ def samples(rollout: Rollout, scans: DriveScans, body: RobotFrames) -> list[Topi
         transforms("/tf", stamps, frames, _pose7(moving.reshape(-1, 3)).reshape(*moving.shape[:2], 7)),
         odometry(
             "/odom",
-            (ODOM, body.base),
+            (odom, body.base),
             stamps,
             measured.pose,
             measured.twist,
             measured.pose_covariance,
             measured.twist_covariance,
         ),
-        odometry("/ground_truth/odom", (MAP, TRUTH), stamps, truth, rollout.twist, none, none[:, :2, :2]),
+        odometry("/ground_truth/odom", (MAP, true), stamps, truth, rollout.twist, none, none[:, :2, :2]),
         joint_states("/joint_states", stamps, rollout, measured, body),
         twists("/cmd_vel", stamps, rollout.command),
         numbers("/clearance", "std_msgs/msg/Float64", "f8", stamps, rollout.clearance),

@@ -38,7 +38,7 @@ def scenery(rollout: Rollout, body: RobotFrames) -> tuple[Topic, list[Topic]]:
         "/obstacles": ("visualization_msgs/msg/MarkerArray", _markers(_standing(rollout))),
     }
     if rollout.movers.shape[1]:
-        latched["/movers"] = "visualization_msgs/msg/MarkerArray", _markers(_moving(rollout))
+        latched["/movers"] = "visualization_msgs/msg/MarkerArray", _markers(_moving(rollout, body))
     topics = [_message(name, kind, [start], [content], latched=True) for name, (kind, content) in latched.items()]
     once = [*_maps(rollout), *topics, _routes(rollout)]
     return static, [*once, *_contacts(rollout), _limiters(rollout), _events(rollout)]
@@ -121,7 +121,7 @@ def _routes(rollout: Rollout) -> Topic:
 def routes_of(rollout: Rollout) -> Iterator[tuple[float, Floats]]:
     """Yield each route's start time [s] and points (N, 2) [m] in the map's frame, as the robot estimates its pose there."""
     frame = rollout.record.task.frame
-    for rows, route in rollout.legs():
+    for rows, route in rollout.legs() if len(rollout.route) else ():
         yield float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)]), world_to_map(frame, route)
 
 
@@ -145,12 +145,12 @@ def _standing(rollout: Rollout) -> list[Any]:
     return [*markers, walls]
 
 
-def _moving(rollout: Rollout) -> list[Any]:
+def _moving(rollout: Rollout, body: RobotFrames) -> list[Any]:
     """Return markers of the movers, each in its own moving frame."""
     at, markers = float(rollout.t[0]), []
     for i, mover in enumerate(rollout.record.world.movers):
         size = (2 * mover.radius, 2 * mover.radius, mover.height)
-        markers.append(_marker(at, mover_frame(i), "movers", i, CYLINDER, MOVING, (0.0, 0.0), size))
+        markers.append(_marker(at, body.frame(mover_frame(i)), "movers", i, CYLINDER, MOVING, (0.0, 0.0), size))
         markers[-1].frame_locked = True
     return markers
 
@@ -174,7 +174,7 @@ def _contacts(rollout: Rollout) -> list[Topic]:
 
 def _limiters(rollout: Rollout) -> Topic:
     """Return the name of the speed-limiting rule at each change."""
-    rows = np.flatnonzero(np.diff(rollout.limiter, prepend=-1.0)).tolist()
+    rows = np.flatnonzero(np.diff(rollout.limiter, prepend=-1.0)).tolist() if rollout.record.limiters else []
     names = [_text(rollout.record.limiters[rollout.limiter[row]]) for row in rows]
     return _message("/limiter_name", "std_msgs/msg/String", [float(rollout.t[row]) for row in rows], names)
 

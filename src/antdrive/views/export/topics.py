@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ from antdrive.base.types import Ints
 Payloads = Sequence[bytes | memoryview]
 
 MAP, ODOM, TRUTH = "map", "odom", "ground_truth"
+#: Stamp of a log's time 0 in the export under way [ns].
+START: ContextVar[int] = ContextVar("START", default=0)
 
 
 def mover_frame(index: int) -> str:
@@ -42,8 +45,8 @@ class Topic:
 
 
 def nanoseconds(t: npt.ArrayLike) -> Ints:
-    """Convert times [s] to ROS stamps [ns]."""
-    return np.rint(np.atleast_1d(np.asarray(t, dtype=np.float64)) * 1e9).astype(np.int64)
+    """Convert times of a log [s] to ROS stamps [ns]."""
+    return np.rint(np.atleast_1d(np.asarray(t, dtype=np.float64)) * 1e9).astype(np.int64) + START.get()
 
 
 def library(name: str) -> Any:
