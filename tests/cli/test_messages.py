@@ -52,7 +52,12 @@ demo --out small.yaml
 export run.npz --to csv -o new --force
 export run.npz --to csv -o new --urdf cart.urdf
 export run.npz --to ros1 -o new --force
+export run.npz --to csv -o new --namespace a
+export run.npz --to csv -o new --start-time 1
 export run.npz --to rosbag2 -o new --force
+export run.npz -o new.mcap --namespace 1a
+export run.npz -o new.mcap --namespace ''
+export run.npz -o new.mcap --start-time -1
 export run.npz -o new.mcap --arg a=1
 falsify --method wise
 falsify -p mine.py:Mine

@@ -31,6 +31,9 @@ WORKS = {
     "report": ("kept -o report.html", "camp -o report.md"),
     "export": ("log.npz --to csv -o csv",),
     "verify": ("log.npz",),
+    "certify": ("log.csv --map small.yaml",),
+    "check": ("log.drive.yaml",),
+    "accept": ("log.drive.yaml",),
     "margin": ("log.npz",),
     "planners": ("", "astar"),
     "controller": ("",),
@@ -69,7 +72,12 @@ def folder(tmp_path, small, small_run, monkeypatch):
     small_run.rollout.save(tmp_path / "log.npz")
     write_run(small_run, tmp_path / "kept", "antdrive run small.yaml", figures=False)
     export_sdf(small_run.scenario.task, tmp_path / "small.sdf")
-    (tmp_path / "small.drive.yaml").write_text("schema: 1\nscenarios:\n  - {name: a, world: small.yaml}\n")
+    (tmp_path / "small.drive.yaml").write_text("schema: 1\nscenarios:\n  a: {world: small.yaml}\n")
+    (tmp_path / "log.drive.yaml").write_text(
+        "schema: 1\nscenarios:\n  a: {log: log.csv, world: small.yaml, baseline: false}\n"
+    )
+    rows = np.column_stack([small_run.rollout.t, small_run.rollout.pose])[::8]
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="t,x,y,yaw", comments="")
     shutil.copy(URDF, tmp_path / "pioneer.urdf")
     written(tmp_path / "camp", PLANNERS)
     (tmp_path / "paths").mkdir()

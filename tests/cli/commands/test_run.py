@@ -9,6 +9,9 @@ import pytest
 
 from antdrive.base.atomic import folder_lock
 from antdrive.robots import list_robots
+from antdrive.runs.campaigns.campaign import make_campaign
+from antdrive.runs.campaigns.expanding import expand
+from antdrive.runs.suites.scenarios import scenario_of, select
 from antdrive.worlds import Disc, Task, World, save_task
 
 
@@ -173,3 +176,46 @@ def test_options_that_a_reason_names_work_as_typed(antdrive, tmp_path, goal, opt
     assert f"; {options} finds one)" in out
     assert f"; {options} finds one\n" in antdrive("worlds", "show", "shelf.yaml")[1]
     assert antdrive("plan", "shelf.yaml", "-p", "astar", *options.split())[0] == 0
+
+
+def test_a_plan_of_a_file_is_checked_driven_and_verified_until_it_changes(antdrive, small, small_run):
+    """From another folder, verify takes the file by name."""
+    Path("plans").mkdir()
+    file = Path("plans/nav2.csv")
+    file.write_text("\n".join(f"{x},{y}" for x, y in small_run.rollout.route.tolist()))
+    code, out, _ = antdrive("plan", small, "-p", file)
+    assert code == 0
+    assert re.match(r"small: nav2\.csv found a path \(at least 0\.\d+ m from obstacles\)\n", out)
+    assert antdrive("run", small, "-p", file, "--no-figures", "--out", "r")[0] == 0
+    assert "replayed bit for bit" in antdrive("verify", "r", "--replay")[1]
+    file.rename("moved.csv")
+    code, out, _ = antdrive("verify", "r", "--replay")
+    assert (code, out.splitlines()[1]) == (1, "  replay: planner: plans/nav2.csv: no such file")
+    assert "replayed bit for bit" in antdrive("verify", "r", "--replay", "-p", "moved.csv")[1]
+    file.write_text(Path("moved.csv").read_text().rpartition("\n")[0] + "\n0,0\n")
+    assert "plans/nav2.csv holds another plan than before" in antdrive("verify", "r", "--replay")[1]
+    code, out, _ = antdrive("plan", small, "-p", file, "--json")
+    assert (code, json.loads(out)["status"]) == (1, "invalid")
+    assert json.loads(out)["reason"].startswith("waypoints: ")
+
+
+@pytest.mark.parametrize("kind", ["suite", "campaign"])
+def test_suites_and_campaigns_name_plans_beside_them(kind, small, small_run, tmp_path):
+    home = tmp_path / "home"
+    home.mkdir()
+    (home / "nav2.csv").write_text("\n".join(f"{x},{y}" for x, y in small_run.rollout.route.tolist()))
+    if kind == "campaign":
+        jobs = expand(make_campaign({"worlds": [str(small.absolute())], "planners": ["astar", "nav2.csv"]}, home))
+        job = jobs.jobs[-1]
+        digest = job.case.scenario(0).planner.digest
+        assert (job.case.planner.label, job.case.planner.version) == ("nav2.csv", f"nav2.csv {digest[:8]}")
+        assert job.case.written.planner == f"planners/{digest[:8]}/nav2.csv"
+        assert jobs.codes == {job.case.written.planner: home / "nav2.csv"}
+        return
+    (home / "s.drive.yaml").write_text(
+        f"schema: 1\nscenarios:\n  a: {{world: {small.absolute()}, planner: nav2.csv}}\n"
+    )
+    (case,) = select([str(home / "s.drive.yaml")])
+    scenario = scenario_of(case)
+    assert (scenario.smoothing, scenario.planner_label) == ("none", "nav2.csv")
+    assert scenario.written.planner == str(home / "nav2.csv")

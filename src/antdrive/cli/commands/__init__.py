@@ -49,9 +49,10 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "report": Command("Write a report on many runs or on a campaign."),
         "export": Command("Export a drive to Foxglove, RViz or CSV."),
         "verify": Command("Re-certify drives from their logs alone."),
-        "check": Command("Run suites or Python tests, and compare the drives with their baselines.", "plans drives"),
+        "certify": Command("Prove from another program's log how clear a robot was of a map and of other robots."),
+        "check": Command("Run suites or Python tests, and compare the drives with their baselines.", "plans"),
         "accept": Command(
-            "Run suites or Python tests, and save the drives as baselines.", "plans drives", place="check.accept"
+            "Run suites or Python tests, and save the drives as baselines.", "plans", place="check.accept"
         ),
         "margin": Command("Break down a drive's safety margin by cause."),
         "find-margin": Command("Find the smallest margin at which all drives are safe.", "plans drives"),
