@@ -7,9 +7,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.version import require_physics
 from antdrive.runs.pool import cores
 from antdrive.runs.suites import scenario_of, select
-from antdrive.runs.suites.suite import SUFFIX
+from antdrive.runs.suites.suite import SUFFIX, LogCase
 from antdrive.sim.scenario import Scenario
 from antdrive.testing.evaluation import CheckResult, Update, evaluate_cases
 from antdrive.testing.python_tests import drive_python_tests, is_module
@@ -43,6 +44,8 @@ def evaluate_tests(
     Raises:
         InputError: there is no such test, or a suite is invalid.
     """
+    if any(map(is_module, words)):
+        require_physics()
     modules = [word for word in words if is_module(word) or Path(word).is_dir()]
     outcomes, unused = drive_python_tests(modules, only, update, results)
     for result in outcomes:
@@ -53,7 +56,10 @@ def evaluate_tests(
     if not suites:
         return outcomes, unused
     cases = select(suites, only)
-    for case in cases:
+    drives = [case for case in cases if not isinstance(case, LogCase)]
+    if drives:
+        require_physics()  # before any work
+    for case in drives:
         if case.written.settings.get("margin") == "auto":
             with suppress(InputError, FieldError):  # reported as the test's failure
                 scenario_of(case, choose)

@@ -21,7 +21,7 @@ from antdrive.runs.suites.baseline import Baseline, fixed_hashes
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.evaluation import Evaluation, changes, evaluate, explain, unmet_demands
 from antdrive.runs.suites.scenarios import run_command, scenario_of
-from antdrive.runs.suites.suite import SuiteCase, shown_path
+from antdrive.runs.suites.suite import LogCase, SuiteCase, shown_path
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
 from antdrive.sim.rerun import UNSTEADY, fingerprint, fingerprint_of, is_unsteady
@@ -252,7 +252,7 @@ def _criteria_of(case: SuiteCase, update: Update, results: Results | None) -> Cr
 
 
 def evaluate_case(case: SuiteCase, *, update: Update = "", results: Results | None = None) -> CheckResult:
-    """Drive a suite's test and evaluate it.
+    """Drive a suite's test, or read its log, and evaluate it.
 
     Args:
         case: the test
@@ -262,6 +262,8 @@ def evaluate_case(case: SuiteCase, *, update: Update = "", results: Results | No
     Raises:
         InputError: the suite, a file that it names, or the baseline is wrong.
     """
+    if isinstance(case, LogCase):
+        return _criteria_of(case, update, results).evaluate(case.run())
     scenario, criteria = scenario_of(case), _criteria_of(case, update, results)
     run_alone = run_command(case, anywhere=criteria.commands != (shlex.join(["antdrive", "check", case.address]),))
     criteria = dataclasses.replace(criteria, commands=tuple(filter(None, (*criteria.commands, run_alone))))

@@ -43,10 +43,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="folder for logs, figures and films of failed drives (default: user cache)",
     )
     group.addoption(
-        "--drive-film",
-        choices=("never", "failed", "always"),
-        default="failed",
-        help="drives to film (default: failed)",
+        "--drive-film", choices=("never", "failed", "always"), default="failed", help="drives to film (default: failed)"
     )
     group.addoption(
         "--drive-plan-limit", metavar="SECONDS", help="limit on the time of a plan or replan (default: 600, or off)"
@@ -83,7 +80,7 @@ class DriveSuite(pytest.File):
         try:
             cases = load_suite(self.path)
             for case in cases:
-                case.written.check_names(case.suite.parent, case.error)
+                case.check_names()
         except InputError as error:
             raise self.CollectError(str(error)) from None
         self.config.stash[_UNUSED].update(str(path) for path in unused_of_suite(self.path, cases))

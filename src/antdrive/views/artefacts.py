@@ -24,6 +24,7 @@ from antdrive.runs.suites.evaluation import divergence
 from antdrive.runs.suites.suite import SUFFIX
 from antdrive.sim.log.certificate import closed_form_clearance
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.timeline import speeds
 from antdrive.sim.pipeline import Run
 
 #: Tests to film.
@@ -31,7 +32,7 @@ Films: TypeAlias = Literal["never", "failed", "always"]
 
 #: All files of a test's artefacts.
 FILES = (
-    *("result.json", "commands.txt", "rollout.npz", "overview.png"),
+    *("result.json", "commands.txt", "rollout.npz", "certificate.json", "overview.png"),
     *("then-and-now.png", "then-and-now.mp4", "film.mp4", "traceback.txt"),
 )
 FILM_SIZE, FILM_FPS = (960, 540), 20.0
@@ -106,7 +107,7 @@ def write_artefacts(
 
     remove_artefacts(folder)
     rollout = run.rollout
-    files = {} if rollout is None else {"rollout": str(rollout.save(folder / "rollout.npz"))}
+    files = {} if rollout is None else rollout.write_proof(folder)
     files["overview"] = str(folder / "overview.png")
     draw_run(run, files["overview"])
     if rollout is not None:
@@ -166,9 +167,7 @@ def baseline_rollout(baseline: Baseline, now: Rollout) -> Rollout:
     times = baseline.times
     samples = np.array(baseline.line, dtype=np.float64)
     pose = np.column_stack([samples[:, :2], np.unwrap(samples[:, 2])])
-    steps = np.diff(times, prepend=times[0] - 1.0)
-    moved = np.diff(pose, axis=0, prepend=pose[:1])
-    twist = np.column_stack([np.hypot(moved[:, 0], moved[:, 1]), moved[:, 2]]) / np.maximum(steps, 1e-9)[:, None]
+    twist = speeds(times, pose)
     movers = now.trajectories().positions(times)
     length = baseline.metric("path_length_m")
     plan = dataclasses.replace(now.record.plan, length_m=length if math.isfinite(length) else 0.0)

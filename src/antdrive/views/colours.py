@@ -11,10 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.types import Floats
+from antdrive.foreign.playback import ForeignRollout
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
 from antdrive.views.colour_vision import differences, luminance
 
 Colour: TypeAlias = tuple[int, int, int]  # red, green, blue, 0 to 255
+Label: TypeAlias = tuple[str, Colour]
 
 # The map: light ground, slate obstacles, one bright robot.
 PAPER: Colour = (250, 250, 252)
@@ -66,6 +69,14 @@ OUTCOME_LABELS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
         Outcome.INVALID_PLAN: ("INVALID PLAN", BAD),
     }
 )
+
+
+def label_of(log: Rollout) -> Label:
+    """Return the label of a drive's outcome, or of what a foreign log proves, and its colour."""
+    if not isinstance(log, ForeignRollout):
+        return OUTCOME_LABELS[log.outcome]
+    return ("✓ PROVED CLEAR", GOOD) if log.certificate.certified else ("✕ NOT PROVED CLEAR", BAD)
+
 
 #: Colours from standstill to the robot's top speed: viridis without its palest end, which is invisible on light ground.
 SPEED_STOPS: tuple[Colour, ...] = (

@@ -267,6 +267,7 @@ def fixed_hashes(s: Scenario) -> dict[str, str]:
         "robot": canonical_hash(s.robot),
         "unseen obstacles": hashlib.sha256(unseen.encode()).hexdigest(),
         **{name: module_hash(module) for name, module in custom_modules(s).items()},
+        **s.sources,
     }
 
 

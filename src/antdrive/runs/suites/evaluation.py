@@ -20,6 +20,7 @@ from antdrive.base.version import versions
 from antdrive.runs.suites.baseline import Baseline, configuration_hashes, custom_modules
 from antdrive.runs.suites.demands import END, Bound, Demands
 from antdrive.runs.suites.nearest import cause_of_contact, first_contact, first_contact_kind, nearest_of
+from antdrive.sim.log.certificate import Certificate
 from antdrive.sim.log.metrics import METRICS, WALL_CLOCK
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
@@ -40,17 +41,17 @@ class Divergence:
     t: float  # first sample of the baseline's line more than `APART` away from the drive [s]
     now: Point  # robot's position then [m]
     then: Point  # its position in the baseline [m]
-    limiter: str  # rule that limits the robot's speed then
+    limiter: str  # rule that limits the robot's speed then; empty if nobody knows
     limiter_then: str  # rule that limited it in the baseline
 
     @property
     def sentence(self) -> str:
         """The divergence in words."""
-        rule = f"{_rule(self.limiter)} limits the speed there"
+        rule = f"; {_rule(self.limiter)} limits the speed there" if self.limiter else ""
         if self.limiter != self.limiter_then:
             rule += f", in the baseline {_rule(self.limiter_then)} did"
         now, then = format_point(self.now, 2), format_point(self.then, 2)
-        return f"the drives diverge at t = {self.t:.1f} s, at {now} instead of {then}; {rule}"
+        return f"the drives diverge at t = {self.t:.1f} s, at {now} instead of {then}{rule}"
 
 
 def _rule(name: str) -> str:
@@ -93,8 +94,8 @@ def divergence(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Di
         t,
         (x, y),
         baseline.line[at][:2],
-        names[rule] if rule < len(names) else "cruise",
-        names_then[rule_then] if rule_then < len(names_then) else "cruise",
+        names[rule] if rule < len(names) else "cruise" if names else "",
+        names_then[rule_then] if rule_then < len(names_then) else "cruise" if names_then else "",
     )
 
 
@@ -288,9 +289,9 @@ def unmet_demands(run: Run, demands: Demands) -> Iterator[str]:
         yield f"outcome: {run.outcome.key}, expected {demands.outcome.key}{reason}"
     elif demands.must_be_certified and not run.certified:
         problems = run.certificate.problems if run.certificate else ("the robot did not drive",)
-        yield f"certificate: not certified collision-free ({'; '.join(problems)})"
+        yield f"certificate: not {_claim(run)} ({'; '.join(problems)})"
     elif demands.certified is False and run.certified:
-        yield "certificate: certified collision-free, expected not to be"
+        yield f"certificate: {_claim(run)}, expected not to be"
     if run.outcome is demands.outcome and run.rollout is not None:
         yield from _other_contact(run.rollout, demands)
     for bound in demands.bounds:
@@ -298,6 +299,11 @@ def unmet_demands(run: Run, demands: Demands) -> Iterator[str]:
             yield f"{bound.metric}: the robot did not drive, expected {bound.sign} {bound.value:g}"
         elif not bound.holds(measured := run.metric(bound.metric)):
             yield f"{bound.metric}: {measured:.6g}, expected {bound.sign} {bound.value:g}{_place(bound.metric, run.rollout)}"
+
+
+def _claim(run: Run) -> str:
+    """Return what the run's certificate, or that of a drive, claims if it holds."""
+    return (run.certificate or Certificate).claim
 
 
 def _other_contact(rollout: Rollout, demands: Demands) -> Iterator[str]:
@@ -314,7 +320,7 @@ def _outcome_changes(run: Run, baseline: Baseline) -> list[str]:
         return [f"outcome: {run.outcome.key}, in the baseline {baseline.outcome.key}"]
     if run.certified == baseline.certified:
         return []
-    words = "certified collision-free"
+    words = _claim(run)
     return [
         f"certificate: {f'{words}, in the baseline not' if run.certified else f'not {words}, in the baseline it was'}"
     ]

@@ -9,12 +9,13 @@ import numpy as np
 
 from antdrive.base.plane import format_number, format_point
 from antdrive.base.records import STRICT
-from antdrive.robots.clearance import footprint_distances, obstacle_name
+from antdrive.foreign.playback import ForeignRollout
+from antdrive.robots.clearance import footprint_distances
 from antdrive.runs.suites.demands import CYLINDER, MOVER, UNSEEN, WALL
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.margin import budget
 from antdrive.sim.log.rollout import Rollout
-from antdrive.worlds.world import Disc
+from antdrive.worlds.world import Disc, obstacle_name
 
 # Columns of `footprint_distances` and indices in a log's contacts order the walls differently.
 _WALL_OF_CONTACT = (0, 2, 1, 3)  # left, right, lower, upper as columns after the obstacles
@@ -41,6 +42,8 @@ class ClosestApproach:
 def nearest_of(rollout: Rollout) -> ClosestApproach:
     """Return the closest approach of a drive."""
     row = int(rollout.clearance.argmin())
+    if isinstance(rollout, ForeignRollout):
+        return _encounter(rollout, row, rollout.certificate.nearest.rpartition(": ")[0])
     world = dataclasses.replace(rollout.record.world, movers=())
     static = footprint_distances(world, rollout.record.robot, [rollout.pose[row]])[0]
     index, least = int(static.argmin()), float(static.min())

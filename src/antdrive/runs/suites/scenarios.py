@@ -58,7 +58,7 @@ def select(words: Sequence[str], only: str | None = None) -> list[SuiteCase]:
             if only is None or fnmatch.fnmatchcase(case.name, only) or case.id == only:
                 selected.setdefault((case.suite, case.id), case)
     for case in selected.values():
-        case.written.check_names(case.suite.parent, case.error)
+        case.check_names()
         case.written.check_settings(case.error)
     if not selected:
         raise input_error("--only", f"no test of {' '.join(words)} matches {only!r}")

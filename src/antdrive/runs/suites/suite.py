@@ -9,22 +9,26 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
-from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema, create_model
+from pydantic import BaseModel, BeforeValidator, Field, PlainValidator, WithJsonSchema, create_model
 
 from antdrive.base.checks import SchemaVersion, check
 from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import FieldError, InputError
 from antdrive.base.files import unreadable
-from antdrive.base.records import STRICT
+from antdrive.base.records import STRICT, attributes_of
+from antdrive.foreign.setup import ForeignSetup
 from antdrive.planners.registry import PLANNERS
 from antdrive.runs.suites.demands import END, KINDS, Demands, causes
 from antdrive.sim.forms import SeedList, TextOrMapping, file_fields, given_settings
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.settings import SETTINGS, tested_settings
-from antdrive.sim.written import Written
+from antdrive.sim.written import Written, placed
+
+if TYPE_CHECKING:
+    from antdrive.sim.facts import Run
 
 SUFFIX = ".drive.yaml"
 MAX_CASES = 100_000  # most tests (scenarios times seeds) in one suite
@@ -33,6 +37,7 @@ BASELINES = "baselines"  # subfolder beside a suite
 #: Python names and likely misnomers of some keys.
 _SYNONYMS = MappingProxyType(
     {"avoidance": "avoid", "replanning": "replan", "perception": "sees", "seed": "seeds", "options": "planner"}
+    | dict.fromkeys(("file", "pose", "map_frame", "robot_frame", "others", "pose_error", "unknown"), "log")
 )
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 
@@ -44,6 +49,21 @@ def _anything(value: Any) -> Any:
 _TRAJECTORY_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0.002}, {"const": "exact"}]}
 
 TrajectoryValue = Annotated[Any, PlainValidator(_anything), WithJsonSchema(_TRAJECTORY_SCHEMA)]
+
+
+_HINTS, _TEXTS = get_type_hints(ForeignSetup), attributes_of(ForeignSetup.__doc__)
+_USUAL = {one.name: one.default for one in dataclasses.fields(ForeignSetup)} | {"others": {}}
+_KEYS: Any = {
+    name: (_HINTS[name], Field(usual, description=_TEXTS[name]))
+    for name, usual in _USUAL.items()
+    if name not in ("log", "world", "robot")
+}
+_FILE = (str, Field(description=_TEXTS["log"]))
+LogEntry: Any = create_model("LogEntry", __config__=STRICT, __doc__="Another program's log.", file=_FILE, **_KEYS)
+
+
+def _named_log(value: Any) -> Any:
+    return {"file": value} if isinstance(value, str) else value
 
 
 class CaseEntry(BaseModel):
@@ -67,7 +87,12 @@ class CaseEntry(BaseModel):
     robot: str = Field("turtlebot", description="a robot file relative to the suite, or a robot of the catalogue")
     planner: TextOrMapping = Field(
         "ants",
-        description="a planner's name, planners.py:Mine or my_package.planners:Mine; {name: aco-han, ants: 200} with options",
+        description="a planner's name, mine.py:Mine, my_package.planners:Mine, plan.csv; with options {name: ants, ants: 200}",
+    )
+    log: Annotated[LogEntry | None, BeforeValidator(_named_log)] = Field(
+        None,
+        description="instead of planner and seeds another program's log relative to the suite, or {file: drive.mcap, pose: "
+        "/amcl_pose} with options of `antdrive certify`; world and robot are its map and robot",
     )
     seeds: SeedList = Field([0], description="one test for each: [0, 1, 2], or a range such as 0-9")
     expect: dict[str, Any] = Field(
@@ -100,8 +125,7 @@ class SuiteFile(BaseModel):
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
     defaults: ScenarioEntry = Field(
-        default_factory=ScenarioEntry.model_construct,
-        description="default keys of all scenarios",
+        default_factory=ScenarioEntry.model_construct, description="default keys of all scenarios"
     )
     scenarios: dict[str, ScenarioEntry] = Field(
         description="the scenarios by name", json_schema_extra={"minProperties": 1}
@@ -158,6 +182,10 @@ class SuiteCase:
         """The path of the baseline."""
         return baseline_folder(self.suite) / f"{self.name}-{self.seed}.json"
 
+    def check_names(self) -> None:
+        """Check that everything named exists; raise InputError otherwise."""
+        self.written.check_names(self.suite.parent, self.error)
+
     def error(self, key: str, problem: str) -> InputError:
         """Return the error for a key of the scenario: file, line, key and problem.
 
@@ -167,6 +195,31 @@ class SuiteCase:
         """
         location = _place(self.document, self.name, key, self.own)
         return self.document.error(location, problem)
+
+
+class LogCase(SuiteCase):
+    """One test: another program's log."""
+
+    def check_names(self) -> None:
+        """Check that there is a log, with nothing of drives beside it; raise InputError otherwise."""
+        for key in sorted(self.own & {"planner", "seeds", "task", "start", *(one.key for one in SETTINGS.values())}):
+            raise self.error(key, "is for drives; omit it beside log")
+        if not isinstance(self.entry.world, str | None):
+            raise self.error("world", "must be a file or a world of the catalogue")
+        log: Any = self.entry.log
+        if not (self.suite.parent / log.file).exists():
+            raise self.error("log", f"{log.file} does not exist")
+
+    def run(self) -> Run:
+        """Read the log, and return it as a run."""
+        from antdrive.foreign.playback import foreign_run
+
+        entry: Any = self.entry
+        words = dict(entry.log)
+        setup = ForeignSetup(log=words.pop("file"), world=entry.world, robot=entry.robot, **words)
+        goal = entry.goal and tuple(entry.goal)
+        with placed(lambda key, problem: self.error(key if key in ("world", "robot") else f"log.{key}", problem)):
+            return foreign_run(setup.certificate(self.suite.parent), setup, goal)
 
 
 def baseline_folder(suite: Path) -> Path:
@@ -233,7 +286,7 @@ def _cases(path: Path, document: Document, name: str, defaults: ScenarioEntry, e
     for key in ("expect", "tolerance"):
         values[key] = {**getattr(defaults, key), **getattr(entry, key)}
     merged = ScenarioEntry.model_construct(**values)
-    if merged.world is None:
+    if merged.world is None and merged.log is None:
         hint = ScenarioEntry.model_fields["world"].description
         raise document.error(("scenarios", name, "world"), f"missing; write {hint}")
     try:
@@ -244,6 +297,8 @@ def _cases(path: Path, document: Document, name: str, defaults: ScenarioEntry, e
         if not merged.baseline and key in own and getattr(entry, key):
             problem = "needs a baseline; omit it, or baseline: false"
             raise document.error(_place(document, name, key, own), problem)
+    if merged.log is not None:
+        return [LogCase(path, name, 0, merged, demands, document, own)]
     return [SuiteCase(path, name, seed, merged, demands, document, own) for seed in merged.seeds]
 
 
@@ -278,6 +333,7 @@ def suite_schema() -> dict[str, Any]:
         },
         "additionalProperties": False,
     }
+    entry["log"]["anyOf"].append({"type": "string"})
     compared = {name: metric.definition for name, metric in METRICS.items() if metric.better != "neither"}
     compared[END] = "Distance between the ends of the two drives."
     entry["tolerance"] |= {

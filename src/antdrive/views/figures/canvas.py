@@ -21,8 +21,8 @@ from matplotlib.figure import Figure
 from antdrive.base.atomic import atomic_write
 from antdrive.base.files import known_suffix
 from antdrive.base.types import Bounds
-from antdrive.sim.log.outcome import Outcome
-from antdrive.views.colours import INK, MUTED, OUTCOME_LABELS, hexed
+from antdrive.sim.log.rollout import Rollout
+from antdrive.views.colours import INK, MUTED, hexed, label_of
 from antdrive.views.scene import Scene
 
 SUFFIXES = (".png", ".pdf", ".svg")
@@ -88,11 +88,11 @@ def sheet(path: str | Path | None, size: tuple[float, float], dpi: float = 160) 
             write_figure(figure, target, dpi)
 
 
-def draw_title(figure: Figure, title: str, outcome: Outcome | None = None) -> None:
+def draw_title(figure: Figure, title: str, log: Rollout | None = None) -> None:
     """Draw a figure's title and, on the right, the drive's outcome."""
     figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
-    if outcome is not None:
-        name, colour = OUTCOME_LABELS[outcome]
+    if log is not None:
+        name, colour = label_of(log)
         figure.text(0.988, 0.993, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
 
 

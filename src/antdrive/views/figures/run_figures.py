@@ -83,7 +83,7 @@ def overview(
         _draw_speed(figure.add_subplot(grid[1, 1], sharex=clearance, label="speed"), scene, rollout)
         _draw_limiters(figure.add_subplot(grid[2, 1], sharex=clearance, label="limiters"), rollout)
         planner = rollout.record.planner.name
-        draw_title(figure, f"{scene.name}   ·   {planner}   ·   {scene.robot.name}", rollout.outcome)
+        draw_title(figure, f"{scene.name}   ·   {planner}   ·   {scene.robot.name}", rollout)
     return figure
 
 
@@ -112,7 +112,8 @@ def _draw_clearance(axes: Any, scene: Scene, rollout: Rollout) -> None:
 def _draw_speed(axes: Any, scene: Scene, rollout: Rollout) -> None:
     """Draw commanded and measured speed over time."""
     axes.set_title("speed [m/s]", pad=20)  # above its legend
-    axes.plot(rollout.t, rollout.command[:, 0], color=hexed(SHELL), lw=2.4, alpha=0.55, label="commanded")
+    if rollout.measured is None:  # a foreign log tells no commands
+        axes.plot(rollout.t, rollout.command[:, 0], color=hexed(SHELL), lw=2.4, alpha=0.55, label="commanded")
     axes.plot(rollout.t, rollout.twist[:, 0], color=hexed(ROUTE), lw=1.0, label="measured")
     axes.axhline(scene.robot.max_speed, color=hexed(MUTED), lw=0.9, ls="--", label="robot's top speed")
     axes.tick_params(labelbottom=False)

@@ -67,7 +67,7 @@ def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float
         curve.set(title="explored area [m²]", ylim=(0, None), xlim=(0, max(float(rollout.t[-1]), 1e-3)))
         curve.text(moments[-1], explored[-1], f"  {explored[-1]:.1f}", va="center", fontsize=8)
         _draw_detections(figure.add_subplot(areas[1, 1], sharex=curve, label="first detections"), rollout, listed)
-        draw_title(figure, f"{scene.name}   ·   occupancy map of {scene.robot.name}", rollout.outcome)
+        draw_title(figure, f"{scene.name}   ·   occupancy map of {scene.robot.name}", rollout)
     return figure
 
 

@@ -186,6 +186,7 @@ def legend_entries(
     own_map: bool = False,
     tracked: bool = False,
     glow: bool = False,
+    routed: bool = True,
 ) -> list[LegendEntry]:
     """Return the legend's entries, one for each kind of object in the picture."""
     if planning:
@@ -195,7 +196,8 @@ def legend_entries(
         ]
     else:
         speeds = f"speed, 0 to {scene.robot.max_speed:.3g} m/s"
-        entries = [LegendEntry("ramp", colours.INK, speeds), LegendEntry("dash", colours.ROUTE, "planned route")]
+        entries = [LegendEntry("ramp", colours.INK, speeds)]
+        entries += [LegendEntry("dash", colours.ROUTE, "planned route")] if routed else []
     if glow:
         entries.append(LegendEntry("halo", colours.SHELL, "robot"))
     if replans:
@@ -319,13 +321,21 @@ def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float
             draw.line([(end, y - 0.35 * size), (end, y + 0.35 * size)], fill=colour, width=line)
 
 
-def banner(outcome: Outcome, layout: Layout, room: int, reason: str = "", certificate: str = "") -> Sprite:
+def banner(
+    outcome: Outcome,
+    layout: Layout,
+    room: int,
+    reason: str = "",
+    certificate: str = "",
+    label: colours.Label | None = None,
+) -> Sprite:
     """Draw the outcome as a sentence with its reason and certificate, for the end of a film, at most 0.86 of `room` wide [px].
 
-    The reason of a stuck robot replaces the general sentence.
+    The reason of a stuck robot replaces the general sentence, and so does a label that is given.
     """
-    name, colour = colours.OUTCOME_LABELS[outcome]
+    name, colour = label or colours.OUTCOME_LABELS[outcome]
     sentence = "stuck" if reason and outcome is Outcome.STUCK else outcome.value
+    sentence = name.strip("✓✕ ").lower() if label else sentence
     sentence = sentence[0].upper() + sentence[1:]
     size = round(1.5 * layout.unit)
     text = f"{name[0]}  {sentence}" if name[0] in "✓✕" else sentence

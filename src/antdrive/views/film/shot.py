@@ -10,7 +10,7 @@ import numpy as np
 from antdrive.base.types import Floats
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.colours import CONTACT, GOAL, OUTCOME_LABELS, ROUTE, START, Colour
+from antdrive.views.colours import CONTACT, GOAL, ROUTE, START, Colour, label_of
 from antdrive.views.film import overlay
 from antdrive.views.film.camera import Camera, Picture, camera_for
 from antdrive.views.film.compositor import Compositor, drawn_height, has_glow
@@ -38,7 +38,7 @@ class Shot:
         self.slow_motion = self.playback.slow_motion(speed)
         self._flash = FLASH * speed
         self.scene = scene = Scene.of(rollout)
-        self.outcome = rollout.outcome
+        self.outcome, self.label = rollout.outcome, label_of(rollout)
         self._follows = self.options.camera == "follow"
         self._tracks_movers = not planning and len(rollout.tracks) > 0
         scans = not planning and len(rollout.scans) > 0
@@ -47,7 +47,7 @@ class Shot:
         replans = not planning and any(event.caption for event in self.playback.replans)
         legend = self._lay_out(rollout, planning=planning, replans=replans, bare=bare)
         planner = rollout.record.planner.name
-        subtitle = f"planner {planner}  ·  robot {scene.robot.name}"
+        subtitle = f"{'planner ' if rollout.measured is None else ''}{planner}  ·  robot {scene.robot.name}"
         fields = overlay.PLAN_FIELDS if planning else overlay.DRIVE_FIELDS
         self._band = overlay.Band(self._layout, scene.name, subtitle, None if planning else note, legend, fields)
         fine = 3 if size[0] * size[1] <= 400_000 and not self._follows else 2
@@ -65,6 +65,7 @@ class Shot:
     def _lay_out(self, rollout: Rollout, *, planning: bool, replans: bool, bare: bool) -> overlay.LegendRows:
         """Choose layout, camera and legend: a card in a corner, or rows of the band if the card would cover the world."""
         shows = {"beams": self._fan is not None, "own_map": self._own_map is not None, "tracked": self._tracks_movers}
+        shows["routed"] = len(rollout.route) > 0
         size = self.options.size
         for rows in range(1 + MOST_LEGEND_ROWS):
             layout = overlay.Layout.of(size, rows, self.options.note or "")
@@ -91,13 +92,14 @@ class Shot:
         at = self.playback.duration
         view = self.view(at, last=True)
         unit, room = self._layout.unit, max(view.shape[1] - self._legend_width, view.shape[1] // 2)
-        verdict = overlay.banner(self.outcome, self._layout, room, self._rollout.record.reason, caption(self._rollout))
+        said, label = self._rollout.record.reason, self.label if self._rollout.measured else None
+        verdict = overlay.banner(self.outcome, self._layout, room, said, caption(self._rollout), label)
         robot_high = self._compositor.pixel(*self.playback.pose(at)[:2])[1] < 0.4 * view.shape[0]
         low = robot_high or self._legend_width + verdict.shape[1] > view.shape[1]
         top = view.shape[0] - verdict.shape[0] - round(1.2 * unit) if low else round(1.2 * unit)
         left = max((view.shape[1] - verdict.shape[1]) // 2, 0 if low else self._legend_width)
         put(view, verdict, left, top)
-        return self._with_band(view, self._values(at), OUTCOME_LABELS[self.outcome])
+        return self._with_band(view, self._values(at), self.label)
 
     def planning_frame(self, values: overlay.Values, grid: Grid, levels: Floats, path: Floats) -> Picture:
         """Return a frame (H, W, 3) of planning: the planner's field and its best path (N, 2) [m] so far."""
@@ -232,8 +234,7 @@ def caption(log: Rollout) -> str:
     """Return a film's line about the certificate; empty if the robot has not driven."""
     if not len(log.t):
         return ""
-    c = certify(log)
-    return f"certified: never closer than {c.bound:.3f} m" if c.certified else "not certified collision-free"
+    return certify(log).caption
 
 
 def _put_above(view: Picture, sprite: Sprite, x: float, bottom: float) -> None:
