@@ -33,6 +33,13 @@ READERS = {
     "compare tables -p astar -p ants": "tables/grid.parquet",
     "export FILE --to csv -o new": "a.npz",
     "verify FILE": "a.npz",
+    "certify FILE --map empty": "a.csv",
+    "certify ./FILE --map empty": "a.mcap",
+    "certify FILE --map empty --robot turtlebot": "a.bag",
+    "certify table.csv --map FILE": "w.yaml",
+    "plan empty -p FILE": "p.csv",
+    "plan empty -p ./FILE": "p.geojson",
+    "run empty -p FILE": "p.mcap",
     "verify runs --world FILE": "w.yaml",
     "check FILE": "a.drive.yaml",
     "accept FILE": "a.drive.yaml",
@@ -79,6 +86,7 @@ AROUND = {
     "scenes.map": "type octile\nheight 2\nwidth 3\nmap\n.@.\n...\n",
     "map.yaml": "image: map.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n",
     "tables/manifest.json": '{"size": 3}',
+    "table.csv": "t,x,y,yaw\n0,1,1,0\n0.1,1.02,1,0\n",
     "paths/world_1.world": "<sdf version='1.6'><world name='w'/></sdf>",
     **{
         f"{kind}.urdf": URDF.read_text().replace(

@@ -49,6 +49,10 @@ INVALID = [
     "report drive -o OUT.doc",
     "export nowhere -o OUT.mcap",
     "export drive --to wise -o OUT",
+    "certify nowhere.csv --map empty -o OUT",
+    "certify track.csv --map empty --film OUT.doc",
+    "certify track.csv --map empty --export OUT.doc",
+    "certify track.csv --map empty --init OUT.yaml",
     "worlds generate wood -o OUT.yaml",
     "worlds import nowhere.sdf -o OUT.yaml",
     "worlds import wrong.map -o OUT.yaml",
@@ -73,6 +77,10 @@ WRITING = [
     "render drive -o OUT.png",
     "report drive -o OUT.html",
     "export drive -o OUT.mcap",
+    "certify track.csv --map empty -o OUT",
+    "certify track.csv --map empty --film OUT.mp4",
+    "certify track.csv --map empty --export OUT.mcap",
+    "certify track.csv --map empty --init OUT.drive.yaml",
     "export drive --to csv -o OUT",
     "worlds generate forest -o OUT.yaml",
     "worlds export empty -o OUT.sdf",
@@ -98,6 +106,7 @@ def made(small_run, tmp_path_factory):
     folder = tmp_path_factory.mktemp("made")
     write_run(small_run, folder / "drive", "antdrive run", figures=False)
     (folder / "wrong.map").write_text("type octile\n")
+    (folder / "track.csv").write_text("t,x,y,yaw\n0,1,1,0\n0.1,1.02,1,0\n")
     assert exit_code_of(["worlds", "export", "empty", "-o", str(folder / "world.sdf")]) == 0
     (folder / "world_0.world").write_bytes((folder / "world.sdf").read_bytes())
     with tarfile.open(folder / "worlds.tar.gz", "w:gz") as archive:

@@ -23,7 +23,7 @@ import numpy as np
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_numbers, wrap_angle
 from antdrive.base.types import Floats
-from antdrive.proof.distances import to_discs, to_walls
+from antdrive.proof.distances import to_discs, to_outline, to_walls, to_world
 from antdrive.proof.track import Track, prove
 from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.sim.log.consistency import GRIP, inconsistencies, windowed
@@ -162,18 +162,23 @@ def closed_form_clearance(rollout: Rollout) -> Floats:
 
     It shares no code with the compiled geometry of the drive, so that each checks the other.
     """
-    return prove(*_tracks(rollout, rollout.trajectories())).clearance
+    foot, pose = rollout.record.robot.footprint, rollout.pose
+    gaps = (to_outline(foot, pose, disc, at) for disc, at in _movers(rollout))
+    return functools.reduce(np.minimum, gaps, to_world(foot, pose, rollout.record.world))
+
+
+def _movers(rollout: Rollout) -> list[tuple[Footprint, Floats]]:
+    """Return the outlines of the movers with their logged poses (T, 3)."""
+    still, movers = np.zeros((len(rollout.pose), 1)), rollout.record.world.movers
+    return [(Footprint.disc(one.radius), np.hstack([rollout.movers[:, m], still])) for m, one in enumerate(movers)]
 
 
 def _tracks(rollout: Rollout, movers: Trajectories) -> tuple[Track, World, list[Track]]:
     """Return the track of the robot, its world, and the tracks of the movers."""
     t, record = _clock(rollout), rollout.record
     robot = Track.measured(t, rollout.pose, rollout.twist, record.robot.footprint)
-    travel, jumps, still = movers.travel(t), movers.jumps(t), np.zeros((len(t), 1))
-    others = [
-        Track(t, np.hstack([rollout.movers[:, m], still]), Footprint.disc(radius), travel[:, m], jumps[:, m])
-        for m, radius in enumerate(movers.radii.tolist())
-    ]
+    travel, jumps, placed = movers.travel(t), movers.jumps(t), enumerate(_movers(rollout))
+    others = [Track(t, pose, disc, travel[:, m], jumps[:, m]) for m, (disc, pose) in placed]
     return robot, record.world, others
 
 
