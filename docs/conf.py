@@ -73,6 +73,7 @@ nitpick_ignore_regex = [
     # How `sweep` words the origin of random tasks.
     ("py:class", r"antdrive\.runs\.campaigns\.job\.TaskOrigin"),
     ("py:class", "ErrorAt"),  # a type of functions
+    ("py:class", r"antdrive\.foreign\.playback\.ForeignRollout"),  # one for which `certify` has a form of its own
     ("py:class", r"Flags|antdrive\.base\.(registry\.Component|components\.Declared)"),  # an array, and type variables
     ("py:.*", r"(gymnasium\.[\w.]+|ResetNeeded)"),
     # How a record's field is read from JSON.
