@@ -44,6 +44,7 @@ myst_heading_anchors = 4
 html_math_renderer = "mathml"  # what browsers draw themselves; MathJax would be loaded from the network
 
 # The API. Docstrings write `code` in single backticks.
+smartquotes = False  # they make one dash of the two before an option
 default_role = "code"
 antdrive_index_only = ["antdrive"]  # other pages describe what these offer
 add_module_names = False

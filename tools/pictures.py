@@ -1,8 +1,8 @@
 """Generator of the pictures in `docs/pictures`: `python -m tools.pictures [NAME ...]`.
 
 README and pages show these pictures without a build, so the repository holds them; each build of the site makes the gallery's
-figures and films. The report's picture needs Chromium. `FROM_PAPERS` are copies of the output of `antdrive reproduce PAPER`,
-and `BY_HAND` are screenshots of other programs.
+figures and films. Pictures of pages need playwright and Chromium. `FROM_PAPERS` are copies of the output of
+`antdrive reproduce PAPER`, and `BY_HAND` are screenshots of other programs.
 """
 
 from __future__ import annotations
@@ -12,25 +12,22 @@ import functools
 import itertools
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from antdrive.robots import list_robots
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.pipeline import run
+from antdrive.sim.pipeline import Run, run
 from antdrive.sim.scenario import Scenario
-from antdrive.views.film.comparison_film import SplitScreen
-from antdrive.views.film.film_options import FilmOptions
 from antdrive.views.film.prelude import planning_frames
 from antdrive.views.film.shot import Shot
 from antdrive.views.film.video import STILLS, film, still
 from antdrive.views.pages.report import write_report
+from antdrive.views.viewer.drive_page import write_page
 from antdrive.worlds import list_worlds, load_task
 from antdrive.worlds.generators.generate import generated
 from antdrive.worlds.trajectories import Trajectories
@@ -44,6 +41,7 @@ SMALL = (640, 360)  # of pictures in tutorials [px]
 FROM_PAPERS = ("hasan-maps.png", "ibraheem2016-history.png", "lee2008-maps.png")
 BY_HAND = ("foxglove.webp",)
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # of Chromium
 
 
 def drive(world: str | Task, planner: str, **settings: Any) -> Rollout:
@@ -60,11 +58,41 @@ def saved(picture: Any, path: Path) -> None:
     Image.fromarray(picture).save(path, format="webp", **STILLS[".webp"])
 
 
+@functools.cache
+def jackal() -> Run:
+    """Drive the README's jackal without a map among movers."""
+    settings = {"map": "none", "localisation": "matching", "noise": 1.0, "seed": 1}
+    return run(Scenario.of("plaza-moving", "dstar-lite", robot="jackal", **settings))
+
+
 def hero(path: Path) -> None:
     """Film a mapless drive among movers."""
-    settings = {"map": "none", "localisation": "matching", "noise": 1.0, "seed": 1}
-    log = drive("plaza-moving", "dstar-lite", robot="jackal", **settings)
-    film(log, path, camera="follow", size=(800, 450), fps=10, speed=1.2)
+    film(jackal().logged.rollout, path, camera="follow", size=(800, 450), fps=10, speed=1.2)
+
+
+def view(path: Path) -> None:
+    """Write the page of the same drive, drive.html, and take its picture."""
+    screenshot(write_page([jackal().logged], path.with_name("drive.html")), path, (1280, 720), "html[data-checked]")
+
+
+def screenshot(page: Path, path: Path, size: tuple[int, int], ready: str = "body") -> None:
+    """Write a browser's picture of the upper part of a page."""
+    from io import BytesIO
+
+    from PIL import Image
+    from playwright.sync_api import sync_playwright
+
+    browser_path = next(filter(None, map(shutil.which, BROWSERS)), None)  # else playwright's own
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=browser_path, args=ARGUMENTS)
+        tab = browser.new_page(viewport={"width": size[0], "height": size[1]}, bypass_csp=True)
+        tab.goto(page.as_uri())
+        tab.wait_for_selector(ready, state="attached")
+        tab.wait_for_timeout(500)
+        taken = tab.screenshot()
+        browser.close()
+    with Image.open(BytesIO(taken)) as picture:
+        picture.convert("RGB").save(path, format="webp", **STILLS[".webp"])
 
 
 def worlds(path: Path) -> None:
@@ -93,21 +121,21 @@ def robots(path: Path) -> None:
     """Render a frame of every robot of the catalogue, one file each."""
     path.with_suffix("").mkdir(exist_ok=True)
     for name in list_robots():
-        shot = Shot(drive("empty", "astar", robot=name), **asdict(FilmOptions("follow", (640, 480)).checked()))
-        saved(shot.frame(0.0)[110:290, 210:430], path.with_suffix("") / f"{name}.webp")
+        shot = Shot(drive("empty", "astar", robot=name), size=(640, 480), bare=True)
+        saved(shot.view(0.0)[150:330, 210:430], path.with_suffix("") / f"{name}.webp")
 
 
 def plaza(path: Path) -> None:
     """Render a robot among movers just after a replan."""
     log = drive("plaza-moving", "dstar-lite")
     replanned = next(replan.t for replan in log.record.replans if replan.t > 3.0)
-    still(log, path, replanned + 0.3, size=SIZE)
+    still(log, path, replanned + 0.3, camera="oblique", size=SIZE)
 
 
 def unknown(path: Path) -> None:
     """Render a mapless robot's occupancy map."""
     log = drive("forest", "astar", robot="jackal", map="none", localisation="matching", noise=1.0, seed=1)
-    still(log, path, 3.2, size=(960, 540))
+    still(log, path, 3.2, camera="oblique", size=(960, 540))
 
 
 def pheromone(path: Path) -> None:
@@ -118,25 +146,20 @@ def pheromone(path: Path) -> None:
 
 def comparison(path: Path) -> None:
     """Render four planners in the same forest."""
-    logs = [drive("forest", name, smoothing="none") for name in ("astar", "aco-han", "ants", "tangent")]
-    screen = SplitScreen(logs, "oblique", SIZE)
-    for at in (6.0, 12.0):
-        picture = screen.frame(at)
-    saved(picture, path)
+    names = ("astar", "aco-han", "ants", "tangent")
+    saved(Shot({name: drive("forest", name, smoothing="none") for name in names}, size=SIZE).frame(12.0), path)
 
 
 def campaign(path: Path) -> None:
     """Render both planners of the tutorial's campaign in its first world."""
     task = generated("forest", 0, ())
     planners: list[tuple[str, Mapping[str, Any]]] = [("astar", {}), ("aco-han", {"ants": 20})]
-    logs = [drive(task, name, options=options, smoothing="none") for name, options in planners]
-    saved(SplitScreen(logs, "oblique", SMALL).frame(8.0), path)
+    logs = {name: drive(task, name, options=options, smoothing="none") for name, options in planners}
+    saved(Shot(logs, size=SMALL).frame(8.0), path)
 
 
 def report(path: Path) -> None:
     """Take a browser's screenshot of the upper part of a report of six runs."""
-    from PIL import Image
-
     scenarios = [
         Scenario.of("plaza-moving", "dstar-lite"),
         Scenario.of("empty", "astar", unseen=(Disc(3.0, 3.0, 0.2),)),
@@ -145,16 +168,10 @@ def report(path: Path) -> None:
         Scenario.of("forest", "astar", smoothing="none"),
         Scenario.of("no-path", "astar"),
     ]
-    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if browser is None:
-        sys.exit(f"report: needs a browser on the path, one of {', '.join(BROWSERS)}")
     with tempfile.TemporaryDirectory() as folder:
-        page, shot = Path(folder) / "report.html", Path(folder) / "report.png"
+        page = Path(folder) / "report.html"
         write_report(map(run, scenarios), page, title="Ants against searches")
-        words = ["--headless", "--no-sandbox", "--hide-scrollbars", "--window-size=1400,1060", f"--screenshot={shot}"]
-        subprocess.run([browser, *words, page.as_uri()], check=True, capture_output=True)  # noqa: S603 (a browser of the path)
-        with Image.open(shot) as picture:
-            picture.convert("RGB").save(path, format="webp", **STILLS[".webp"])
+        screenshot(page, path, (1400, 1060))
 
 
 @functools.cache
@@ -172,12 +189,10 @@ def lesson(page: str) -> Mapping[str, Rollout]:
 
 
 def tutorial(path: Path, page: str, logs: list[str], t: float, camera: str = "oblique") -> None:
-    """Render one log of a tutorial, or two side by side, at a time [s]."""
-    chosen = [lesson(page)[name] for name in logs]
-    if len(chosen) > 1:
-        saved(SplitScreen(chosen, camera, SMALL).frame(t), path)
-    else:
-        still(chosen[0], path, t, camera=camera, size=SMALL)
+    """Render one log of a tutorial, or two in one picture, at a time [s]."""
+    chosen = {name.rpartition("/")[2]: lesson(page)[name] for name in logs}
+    shown = chosen if len(chosen) > 1 else chosen[logs[0].rpartition("/")[2]]
+    saved(Shot(shown, camera=camera, size=SMALL).frame(t), path)
 
 
 #: Page, logs, time [s] and camera of each picture of a tutorial.
@@ -198,7 +213,7 @@ LESSONS: Mapping[str, tuple[Any, ...]] = MappingProxyType({
     "slide": ("film-for-a-talk", ["ants"], 10.0),
     "side-by-side": ("film-for-a-talk", ["compare-slalom/astar", "compare-slalom/aco-han"], 10.0),
 })  # fmt: skip
-DRAWN = (hero, worlds, robots, plaza, unknown, pheromone, comparison, campaign, report)
+DRAWN = (hero, view, worlds, robots, plaza, unknown, pheromone, comparison, campaign, report)
 #: Generator of each picture, by file name.
 MADE: Mapping[str, Callable[[Path], None]] = MappingProxyType({
     **{made.__name__: made for made in DRAWN},

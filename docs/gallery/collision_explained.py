@@ -16,7 +16,7 @@ film(result.rollout, "collision.mp4", size=(640, 480))
 # %%
 # The certificate
 # ---------------
-# Physics reports a contact, and the closed-form distance reaches zero at the same step. The certificate lists both.
+# Physics reports a contact, and the clearance reaches zero at the same step. The certificate lists both.
 
 for line in result.certificate.problems:
     print(line)

@@ -17,7 +17,7 @@ print(result.outcome.value)
 print(
     f"{result.metrics['duration_s']:.1f} s, clearance at least {result.certificate.bound:.3f} m"
 )
-film(result.rollout, "crowded-map.mp4", size=(640, 480), speed=2)
+film(result.rollout, "crowded-map.mp4", camera="oblique", size=(640, 480), speed=2)
 
 # %%
 # Speed limits

@@ -9,7 +9,7 @@ its speed to what it can stop within known free ground.
 
 import numpy as np
 from antdrive import Scenario, film, run
-from antdrive.views import sight_figure
+from antdrive.views import overview
 from antdrive.worlds import barn
 
 world = barn(np.random.default_rng(3), fill=0.27)
@@ -24,9 +24,8 @@ print(
 film(result.rollout, "crowded-lidar.mp4", camera="top", size=(480, 360), speed=3)
 
 # %%
-# Occupancy map and detections
-# ----------------------------
-# Left: the robot's final occupancy map, reconstructed from the scans in its log. Right: the explored area over time, and the
-# first detections of the obstacles with the closest approaches.
+# Route and speed
+# ---------------
+# Each scan that shows an obstacle on the route gives a new route.
 
-seen = sight_figure(result.rollout)
+drive = overview(result.rollout)

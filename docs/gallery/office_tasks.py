@@ -55,4 +55,10 @@ drives = comparison_figure({name: result.rollout for name, result in runs.items(
 
 # sphinx_gallery_thumbnail_number = -1
 
-film(runs["room, upper right"].rollout, "office.mp4", size=(640, 480), speed=2)
+film(
+    runs["room, upper right"].rollout,
+    "office.mp4",
+    camera="oblique",
+    size=(640, 480),
+    speed=2,
+)

@@ -14,7 +14,7 @@ print(result.outcome.value)
 print(
     f"{result.metrics['replans']:.0f} new routes, avoided movers for {result.metrics['avoiding_s']:.1f} s"
 )
-film(result.rollout, "plaza.mp4", size=(640, 480), speed=2)
+film(result.rollout, "plaza.mp4", camera="oblique", size=(640, 480), speed=2)
 
 # %%
 # Clearance and speed over time

@@ -52,7 +52,6 @@ ALLOWED = {
         "Path(__file__).with_name('layout.json').read_text",
     },
     "views/export/topics.py": {"path.open"},
-    "views/pages/attachments.py": {"Image.open"},
     "views/pages/tables.py": {"temporary.open"},
     "worlds/formats/map_server.py": {"part.write_bytes", "Image.open"},
     "worlds/formats/movingai.py": {"part.write_text"},

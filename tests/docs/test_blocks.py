@@ -30,6 +30,7 @@ NOT_RUN = [
     ("docs/how-to/install.md", "they install packages"),
     ("docs/how-to/install.md", "they install packages"),
     ("docs/how-to/robots.md", "they need the repositories of three robots"),
+    ("docs/how-to/tune.md", "it needs Optuna"),
     ("docs/how-to/worlds.md", "they need the network"),
     ("docs/tutorials/first-drive.md", "they set up what the page runs in"),
     ("examples/campaigns/README.md", "they need the worlds of the BARN challenge"),

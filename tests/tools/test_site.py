@@ -39,7 +39,12 @@ SHOWN = re.compile(r"\]\((?:\.\./|docs/)?pictures/([\w./-]+)\)")
 def test_every_picture_of_antdrive_is_made_by_a_command_and_shown_on_a_page():
     folders = [("worlds", list_worlds()), ("robots", list_robots())]
     made = {f"{folder}/{name}.webp" for folder, names in folders for name in names}
-    made |= {f"{name}.webp" for name in {*MADE} - {"worlds", "robots"}} | {*FROM_PAPERS, *BY_HAND, "rooms.svg"}
+    made |= {f"{name}.webp" for name in {*MADE} - {"worlds", "robots"}} | {
+        *FROM_PAPERS,
+        *BY_HAND,
+        "rooms.svg",
+        "drive.html",
+    }
     pages = [ROOT / "README.md", *(page for page in (ROOT / "docs").rglob("*.md") if "_gallery" not in page.parts)]
     shown = {name for page in pages for name in SHOWN.findall(page.read_text())}
     assert made == shown == {path.relative_to(PICTURES).as_posix() for path in PICTURES.rglob("*.*")}
@@ -49,7 +54,7 @@ def test_a_picture_that_nothing_makes_is_refused(capsys):
     with pytest.raises(SystemExit) as ended:
         main(["sunset"])
     assert ended.value.code == 2
-    assert "sunset: no such picture; choose from hero, worlds, robots" in capsys.readouterr().err
+    assert "sunset: no such picture; choose from hero, view, worlds" in capsys.readouterr().err
 
 
 INDEX = '<a href="a/b.html#here">b</a><a href="#top">up</a><a href="https://elsewhere.org">out</a><img src="p.png">'

@@ -91,8 +91,8 @@ def drive_and_film() -> None:
     log, ants = _log(run(_scenario())), _log(run(_scenario("as")))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "warm.mp4"
+        film(log, path, size=(160, 160), fps=2, camera="oblique")
         film(log, path, size=(160, 160), fps=2)
-        film(log, path, size=(160, 160), fps=2, camera="follow")
         film(ants, path, size=(160, 160), fps=2, prelude=1.0)
 
 

@@ -36,7 +36,7 @@ def evaluate_tests(
         only: a pattern with * and ? for the tests' names
         jobs: number of processes; None: one per core
         update: baselines to write
-        results: destination of logs, figures and films
+        results: destination of logs, pages and figures
         choose: chooses the margin `auto`, before processes start
         report: called with each result
         progress: called with the completed fraction of the suites' tests

@@ -57,7 +57,7 @@ class DriveFixture:
         address: pytest's node id of the test, relative to its rootdir
         repeat: the test's name in commands, if it differs from the address
         update: baselines to write
-        results: destination of logs, figures and films; None: write nothing
+        results: destination of logs, pages and figures; None: write nothing
         report: called with the result of each drive
     """
 

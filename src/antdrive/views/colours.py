@@ -26,12 +26,13 @@ GRID: Colour = (203, 210, 220)
 KERB: Colour = (196, 203, 213)
 OBSTACLE: Colour = (121, 136, 160)
 UNSEEN: Colour = (196, 74, 138)  # obstacles placed after planning
-MOVER: Colour = (224, 168, 40)
+MOVER: Colour = (130, 50, 230)
 ZONE: Colour = (96, 128, 186)  # no-go area for the robot's centre
 ROUTE: Colour = (24, 34, 66)
-SHELL: Colour = (255, 122, 14)  # the robot's deck
-TURRET: Colour = (226, 84, 0)  # the robot's upper part
+SHELL: Colour = (224, 96, 0)  # the robot's deck
+TURRET: Colour = (184, 66, 0)  # the robot's upper part
 WHITE: Colour = (255, 255, 255)
+CRUISE: Colour = (92, 138, 150)  # path driven at top speed
 START: Colour = (52, 92, 190)
 GOAL: Colour = (0, 138, 92)
 CONTACT: Colour = (214, 34, 44)
@@ -51,7 +52,7 @@ BAND: Colour = (255, 255, 255)
 # Meaning of labels.
 GOOD: Colour = (0, 128, 84)
 BAD: Colour = (204, 32, 42)
-DOUBT: Colour = (176, 106, 0)
+DOUBT: Colour = (158, 94, 0)
 CALM: Colour = (70, 82, 104)
 
 #: Label and colour of each outcome.
@@ -100,6 +101,11 @@ OWN_COLOURS: tuple[Colour, ...] = (
     *((108, 60, 192), (132, 192, 132), (156, 24, 144), (96, 0, 96)),
     *((132, 156, 252), (60, 60, 48), (168, 180, 168), (36, 72, 84)),
 )
+#: One colour per speed-limiting rule; most are from the colour-blind-safe palette of Okabe and Ito.
+LIMITER_COLOURS = (
+    *("#c9ced6", "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#cc79a7"),
+    *("#d55e00", "#5b6576", "#f0e442", "#7a4b9e", "#1b2333", "#a3d9c9"),
+)
 LEAST_DIFFERENCE = 14.0  # of any two of these colours, for any colour vision (CIE76)
 
 _DASHES = ("solid", "dashed", "dotted")
@@ -118,11 +124,6 @@ PLANNER_STYLES: Mapping[str, tuple[Colour, str]] = MappingProxyType(
 def field_colours(level: npt.ArrayLike) -> Floats:
     """Return colours (N, 3), 0 to 255, for levels (N,), 0 to 1, of a planner's field."""
     return _along(FIELD_STOPS, level)
-
-
-def speed_colours(fraction: npt.ArrayLike) -> Floats:
-    """Return colours (N, 3), 0 to 255, for speeds as fractions (N,) of the robot's top speed."""
-    return _along(SPEED_STOPS, fraction)
 
 
 def _along(colours: tuple[Colour, ...], fraction: npt.ArrayLike) -> Floats:
@@ -204,6 +205,10 @@ def _on_dark(colours: Sequence[Colour]) -> list[str]:
 
 def _shifted(colour: Colour, by: float) -> Colour:
     """Mix a colour with black (-1) or white (1)."""
-    target = 255 if by > 0 else 0
-    red, green, blue = (round(c + abs(by) * (target - c)) for c in colour)
+    return mixed(colour, WHITE if by > 0 else (0, 0, 0), abs(by))
+
+
+def mixed(colour: Colour, other: Colour, share: float) -> Colour:
+    """Mix a colour with a `share` of another."""
+    red, green, blue = (round(c + share * (o - c)) for c, o in zip(colour, other, strict=True))
     return red, green, blue

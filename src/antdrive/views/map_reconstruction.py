@@ -45,11 +45,6 @@ class MapReconstruction:
         self._reset_times = [tick / rollout.record.control_hz for tick in ticks]
 
     @property
-    def explored(self) -> float:
-        """Known area of the map, free or hit [m²]."""
-        return float(np.count_nonzero(self.seen)) * self.map.cell**2
-
-    @property
     def seen(self) -> Flags:
         """Known cells of the map, free or hit (rows, cols)."""
         return np.asarray(self.map.seen_free | self.map.occupied)

@@ -1,4 +1,4 @@
-"""Figures of the papers, and films of a drive on one of each paper's maps."""
+"""Figures of the papers, and a scenario on one of each paper's maps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from antdrive.base import Pose
-from antdrive.planners import capabilities_of
 from antdrive.robots import load_robot
 from antdrive.runs.papers import maps
 from antdrive.runs.papers.claims import Arm
@@ -19,7 +18,6 @@ from antdrive.runs.papers.experiment import Experiment
 from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.maps import HAN_ANTS
 from antdrive.runs.papers.paper_runs import PaperRun, solve
-from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 from antdrive.views.colours import LabelStyle, label_styles
 from antdrive.views.figures.canvas import endings
@@ -30,7 +28,6 @@ from antdrive.views.figures.paper_figures import (
     maps_figure,
     sweep_figure,
 )
-from antdrive.views.film.video import film
 from antdrive.worlds import Disc, Task, World
 from antdrive.worlds.formats.cellmap import CellMap, map_task
 
@@ -42,8 +39,6 @@ CURVES = 3  # planners per panel of lengths by iteration
 PC, PM = (0.1, 0.25, 0.5, 0.75, 0.9), (0.05, 0.1, 0.2, 0.4, 0.6)  # crossover, mutation: han2007's sweep
 CELL = 0.8  # side of a cell of a paper's map [m]: a turtlebot passes between two blocked ones
 HAN_UNIT = 0.7  # unit of han2007 [m]
-SIZE, FPS = (480, 360), 20.0
-PRELUDE, DRIVE = 3.0, 9.0  # length of planning and drive in a film [s]
 
 Measured: TypeAlias = Sequence[tuple[Experiment, list[PaperRun]]]
 
@@ -93,9 +88,10 @@ def _curves(found: Measured, styles: Mapping[str, LabelStyle]) -> dict[str, list
                 style=styles[experiment.name],
                 best=[trial.result.history.best for trial in trials],
                 maps=np.array([trial.world for trial in trials], dtype=np.int64),
-                steps=np.array([trial.work for trial in trials]) if counted else None,
+                spent=1e-6 * np.array([trial.work for trial in trials]) if counted else None,
                 optimum=float(np.median([trial.optimum for trial in trials])),
                 printed=experiment.printed,
+                x="million ant steps" if counted else "iteration",
             )
         )
     return curves
@@ -164,7 +160,7 @@ def _sweep(seeds: int) -> dict[bool, Any]:
     return found
 
 
-#: Experiment whose first map is filmed, by paper.
+#: Experiment whose first map becomes a scenario, by paper.
 SCENES: Mapping[str, Arm] = MappingProxyType(
     {
         "han2007": Arm("14 obstacles", "100 ants"),
@@ -190,26 +186,6 @@ def paper_scenario(paper: str) -> Scenario:
         goal = ((c1 + 0.5) * CELL, (r1 + 0.5) * CELL)
         task = map_task(CellMap(query.grid.free, CELL, (0.0, 0.0)), start, goal, name=f"{paper} {scene.map}")
     return Scenario.of(task, experiment.planner, options=experiment.options, seed=0)
-
-
-def film_paper(paper: str, folder: Path) -> Path | None:
-    """Drive and film a paper's scenario, with planning for iterative planners; return None without a drive."""
-    scenario = paper_scenario(paper)
-    result = run(scenario)
-    if result.rollout is None:
-        return None
-    target = folder / f"{paper}.mp4"
-    film(
-        result.rollout,
-        target,
-        camera="top",
-        size=SIZE,
-        fps=FPS,
-        speed=max(1.0, float(result.rollout.t[-1]) / DRIVE),
-        note=f"{paper}: {scenario.planner_name}",
-        prelude=PRELUDE if capabilities_of(scenario.planner).iterative else 0.0,
-    )
-    return target
 
 
 def _han_task() -> Task:

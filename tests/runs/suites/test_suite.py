@@ -85,7 +85,8 @@ def test_a_suite_can_express_every_setting_of_a_scenario():
         "frame": "start",  # suites have places of the world itself
     }
     assert all(keys[field.name] in ScenarioEntry.model_fields for field in fields(Scenario))
-    about_files = {"settings", "out", "film", "prelude", "vector", "figures", "gui", "json"}
+    about_files = {"settings", "out", "film", "prelude", "camera", "size", "speed", "figures", "no_figures"}
+    about_files |= {"no_view", "json"}
     asked = set(inspect.signature(command).parameters) - about_files
     assert {keys[name] for name in asked} <= set(ScenarioEntry.model_fields)
 

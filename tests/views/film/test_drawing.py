@@ -11,11 +11,9 @@ from antdrive.robots import load_robot
 from antdrive.sim.physics.bullet import bullet, client
 from antdrive.views.colours import MOVER
 from antdrive.views.film.camera import CAMERAS, camera_for
-from antdrive.views.film.compositor import part_pose
 from antdrive.views.film.meshes import Mesh, cylinder, robot_parts
 from antdrive.views.film.solids import AMBIENT, DIFFUSE, Solid, draw_solids, merged, overlap, placed
 from antdrive.views.scene import Scene
-from antdrive.views.window import add_mesh
 from tests.views.film.test_compositor import camera
 
 SIZE = (320, 240)
@@ -67,7 +65,19 @@ def test_bodies_behind_the_camera_are_omitted(scene):
 
 
 SUN = (-0.62, -0.25, 0.74)
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+def add_mesh(number, mesh, colour):
+    """Add a visible mesh to PyBullet client `number` and return its body number."""
+    p = bullet()
+    lists = {
+        "vertices": mesh.vertices.tolist(),
+        "normals": mesh.normals.tolist(),
+        "indices": mesh.triangles.ravel().tolist(),
+    }
+    tint = [*(channel / 255 for channel in colour), 1.0]
+    shape = p.createVisualShape(p.GEOM_MESH, rgbaColor=tint, physicsClientId=number, **lists)
+    return p.createMultiBody(0, -1, shape, physicsClientId=number)
 
 
 def rendered(bodies, camera, box, fine):
@@ -79,9 +89,10 @@ def rendered(bodies, camera, box, fine):
     projection[1] = high / (y1 - y0) * (camera.projection[1] - down * camera.projection[3])
     width, height = (x1 - x0) * fine, (y1 - y0) * fine
     with client() as number:
-        for mesh, colour, (at, turn) in bodies:
+        for mesh, colour, (x, y, *yaw) in bodies:
             body = add_mesh(number, mesh, colour)
-            p.resetBasePositionAndOrientation(body, at, turn, physicsClientId=number)
+            turn = p.getQuaternionFromEuler((0, 0, *(yaw or [0])))
+            p.resetBasePositionAndOrientation(body, (x, y, 0), turn, physicsClientId=number)
         _, _, image, depth, seg = p.getCameraImage(
             width, height, camera.view.T.ravel().tolist(), projection.T.ravel().tolist(), lightDirection=SUN,
             lightColor=[1, 1, 1], lightAmbientCoeff=AMBIENT, lightDiffuseCoeff=DIFFUSE, lightSpecularCoeff=0.0, shadow=0,
@@ -121,16 +132,16 @@ def assert_alike(bodies, camera, fine, least=200):
 def test_cylinders_are_drawn_as_tiny_renderer_draws_them(name, fine, places):
     camera = camera_for(name, (0, 0), (5, 4), 0.6, (240, 180))
     # Not at round places: where an edge runs through many samples exactly, rounding decides on all of them.
-    bodies = [(cylinder(r, 0.0, 0.6), MOVER, ((x + 0.00137, y - 0.00213, 0.0), UPRIGHT)) for x, y, r in places]
+    bodies = [(cylinder(r, 0.0, 0.6), MOVER, (x + 0.00137, y - 0.00213)) for x, y, r in places]
     assert_alike(bodies, camera, fine, least=0)
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
-@pytest.mark.parametrize(("yaw", "wheels"), [(0.0, (0.0, 0.0)), (2.1, (0.4, -1.7)), (-1.3, (3.0, 3.1))])
-def test_robots_are_drawn_as_tiny_renderer_draws_them(robot, yaw, wheels):
+@pytest.mark.parametrize("yaw", [0.0, 2.1, -1.3])
+def test_robots_are_drawn_as_tiny_renderer_draws_them(robot, yaw):
     camera = camera_for("oblique", (0, 0), (2, 1.6), 0.6, (240, 180))
     parts = robot_parts(load_robot(robot))
-    bodies = [(part.mesh, part.colour, part_pose(part, 1.0, 0.8, yaw, wheels)) for part in parts]
+    bodies = [(part.mesh, part.colour, (1.0, 0.8, yaw)) for part in parts]
     assert_alike(bodies, camera, 2)
 
 
@@ -139,7 +150,7 @@ def test_a_body_that_reaches_behind_the_camera_is_cut_off_there():
     camera = camera_for("follow", (-1, -0.6), (1, 0.6), 0.3, (240, 180))
     eye = np.linalg.inv(camera.view)[:3, 3]
     wide = cylinder(1.0, 0.0, float(eye[2]) - 0.2)
-    bodies = [(wide, MOVER, ((float(eye[0]), float(eye[1]), 0.0), UPRIGHT))]
+    bodies = [(wide, MOVER, (float(eye[0]), float(eye[1])))]
     assert (camera.view @ [*eye[:2], 0.0, 1.0])[2] < 0 < (camera.view @ [eye[0], eye[1] - 1.0, eye[2] - 0.2, 1.0])[2]
     image, depth, seg = drawn(bodies, camera, (0, 0, 240, 180), 1)
     # Every sample's ray, by hand: does it meet the roof within the rim?
@@ -158,7 +169,7 @@ def test_a_body_that_reaches_behind_the_camera_is_cut_off_there():
 
 def test_near_bodies_hide_far_ones_in_any_order():
     camera = camera_for("follow", (0, 0), (4, 3), 0.5, (240, 180))
-    near, far = ((cylinder(0.3, 0.0, z), MOVER, ((2.0, y, 0.0), UPRIGHT)) for y, z in ((1.0, 0.5), (1.6, 0.2)))
+    near, far = ((cylinder(0.3, 0.0, z), MOVER, (2.0, y)) for y, z in ((1.0, 0.5), (1.6, 0.2)))
     one, other, alone = (drawn(bodies, camera, (0, 0, 240, 180), 2) for bodies in ([near, far], [far, near], [far]))
     assert (one[1] == other[1]).all()
     assert (other[2] == np.array([1, 0, -1])[one[2]]).all()
@@ -170,7 +181,7 @@ def test_a_mesh_is_drawn_from_outside_only():
     shape = cylinder(0.5, 0.0, 0.6)
     inside_out = Mesh(shape.vertices, shape.normals, shape.triangles[:, ::-1].copy())
     for mesh, visible in ((shape, True), (inside_out, False)):
-        seg = drawn([(mesh, MOVER, ((2.5, 2.0, 0.0), UPRIGHT))], camera, (0, 0, 240, 180), 1)[2]
+        seg = drawn([(mesh, MOVER, (2.5, 2.0))], camera, (0, 0, 240, 180), 1)[2]
         roof = seg[80:100, 110:130]
         assert (roof >= 0).all() == visible
 

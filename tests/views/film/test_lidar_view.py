@@ -102,7 +102,18 @@ def test_hits_are_where_the_map_has_them(log, monkeypatch):
     apart = np.hypot(cols[:, None] + 0.5 - spots[:, 0], rows[:, None] + 0.5 - spots[:, 1])
     assert len(rows) > 100
     assert apart.min(axis=1).max() < 3.5  # painted nowhere else
-    assert (apart.min(axis=0) < 3).mean() > 0.95  # and everywhere there
+    assert (apart.min(axis=0) < 3).mean() > 0.8  # and there, unless a body hides it
+
+
+def test_hits_behind_bodies_are_not_painted(log, monkeypatch):
+    shot = Shot(log, camera="oblique", size=SIZE, bare=True)
+    shown = shot.view(0.3).astype(int)
+    monkeypatch.setattr(lidar_view, "HIT_DEPTH", 9.0)
+    through = picture(log, "oblique", 0.3)
+    rows, cols = np.nonzero(np.abs(through - shown).max(axis=-1) > 40)
+    fine = shot._compositor.fine
+    assert len(rows) > 100
+    assert (shot._compositor.backdrop.bodies[fine * rows, fine * cols] >= 0).mean() > 0.9
 
 
 def test_what_stands_inside_a_cylinder_looks_like_it(log):
@@ -191,16 +202,12 @@ def test_obstacles_are_met_when_a_beam_first_ends_on_them(far):
     assert seen.met.tolist() == expected.tolist()
 
 
-def test_what_was_seen_grows_whatever_the_steps(far):
+def test_what_was_seen_is_the_same_whatever_the_steps(far):
     once, stepwise = MapReconstruction(far), MapReconstruction(far)
-    grown = []
     for at in np.arange(0.0, far.t[-1] + 0.03, 0.03):
         stepwise.advance(at)
-        grown.append(stepwise.explored)
     once.advance(far.t[-1])
     assert np.array_equal(once.seen, stepwise.seen)
-    assert (np.diff(grown) >= 0).all()
-    assert 5.0 < grown[0] < grown[-1] < 6.3 * 4.3
     assert np.array_equal(once.map.discs(), stepwise.map.discs())
 
 

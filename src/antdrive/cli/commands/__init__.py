@@ -38,13 +38,14 @@ DEBUG = "--debug"  # accepted anywhere, so it can be appended to a failed comman
 #: Commands by name, in the order of `antdrive --help`.
 COMMANDS: Mapping[str, Command] = MappingProxyType(
     {
-        "demo": Command("Film ants beside A*: both plan, drive and are certified.", "drives"),
+        "demo": Command("Film ants and A* in one picture: both plan, drive and are certified.", "drives"),
         "init": Command("Write a suite, a robot, a world, a Python test and a GitHub workflow that pass."),
         "run": Command("Plan a path, drive it in physics and certify the drive.", "plans drives"),
         "plan": Command("Plan a path without driving it.", "plans"),
         "compare": Command("Compare planners, or controllers, on worlds or from campaign results.", "plans"),
         "sweep": Command("Run a campaign: every combination of its settings.", "resumes plans"),
         "barn": Command("Drive the BARN Challenge worlds, or score a log.", "resumes plans"),
+        "view": Command("Write a drive's page, drive.html, and open it where there is a screen."),
         "render": Command("Render films of logged drives from any camera."),
         "report": Command("Write a report on many runs or on a campaign."),
         "export": Command("Export a drive to Foxglove, RViz or CSV."),

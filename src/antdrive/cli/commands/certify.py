@@ -11,6 +11,7 @@ from antdrive.base.tables import file_lines, marked
 from antdrive.cli import options
 from antdrive.cli.console import show
 from antdrive.cli.options import argument, option
+from antdrive.cli.output import film_drives
 
 if TYPE_CHECKING:
     from antdrive.sim.facts import Run
@@ -75,7 +76,7 @@ def _written(run: "Run", out: Path | None, film: Path | None, export: Path | Non
     """Write certificate and figure into a folder, a film and a bag; return the files by kind."""
     from antdrive.views.export.exporting import export_foreign
     from antdrive.views.figures.run_figures import draw_run
-    from antdrive.views.run_folder import check_film, write_film
+    from antdrive.views.run_folder import check_film
 
     check_film(film, 0.0, ())
     assert run.rollout is not None
@@ -84,7 +85,7 @@ def _written(run: "Run", out: Path | None, film: Path | None, export: Path | Non
         files |= run.rollout.write_proof(out) | {"figure": str(out / "overview.png")}
         draw_run(run, files["figure"])
     if film is not None:
-        files["film"] = str(write_film([run.rollout], film)["file"])
+        files["film"] = film_drives(run.rollout, film)["file"]
     return files if export is None else files | export_foreign(run.rollout, export)
 
 

@@ -93,7 +93,7 @@ class Certificate:
     def sentence(self) -> str:
         """Statement with its distances."""
         least, bound = in_metres(self.min_clearance), in_metres(self.bound)
-        return f"{self.statement}: minimum clearance {least}, between steps at least {bound}"
+        return f"{self.statement}: clearance {least}, between steps ≥ {bound}"
 
     def _repr_html_(self) -> str:
         from antdrive.worlds.svg import card

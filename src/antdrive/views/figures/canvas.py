@@ -6,7 +6,7 @@ The file's suffix selects PNG, PDF or SVG. Equal data gives equal bytes: files c
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -154,7 +154,7 @@ def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
     return target
 
 
-def endings(suffixes: Sequence[str]) -> list[tuple[str, str]]:
+def endings(suffixes: Iterable[str]) -> list[tuple[str, str]]:
     """Return pairs of suffix and ending of the figure's key: empty for the first suffix."""
     return [(suffix, "" if k == 0 else f" {suffix[1:]}") for k, suffix in enumerate(suffixes)]
 

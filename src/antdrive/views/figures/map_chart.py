@@ -16,7 +16,7 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.views import colours
 from antdrive.views.colours import Colour, hexed
 from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, legend_above, thinned
-from antdrive.views.scene import Scene, contact_point
+from antdrive.views.scene import Scene, contact_point, decisive_row
 from antdrive.worlds.coverage import share_of
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 
 FIELD = LinearSegmentedColormap.from_list("field", [hexed(stop) for stop in colours.FIELD_STOPS])
+ROUNDING = 1e-6  # smallest relative range of a field's values; less is rounding
 SWEPT = 0.02  # motion of the farthest corner between two drawn footprints [m]
 LABEL = (0.5, 0.17)  # width and height of a door's label [inches]; doors within it of a labelled one have none
 MANY = 1000  # cylinders; larger numbers are drawn without edges
@@ -171,7 +172,7 @@ def _draw_swept(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
 
 
 def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: Floats | None) -> None:
-    """Draw the route, the driven path coloured by speed, the robot's final pose and the first contact."""
+    """Draw the route, the driven path coloured by speed, the first contact, and the robot there and at the end."""
     handles: list[Any] = []
     if cells is not None and len(cells):
         handles += axes.plot(*cells.T, ".", ms=2.6, color=hexed(colours.MUTED), label="planned cells", zorder=4.6)
@@ -187,8 +188,9 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
         style = {"cmap": SPEEDS, "norm": Normalize(0, fastest), "lw": 2.6, "capstyle": "round"}
         lines = draw_along(axes, rollout.pose[keep, :2], np.abs(rollout.twist[keep[:-1], 0]), **style)
         colour_bar(figure, lines, axes, "driven path: speed [m/s]", **BELOW)
-        x, y, yaw = rollout.pose[-1].tolist()
-        _draw_robot(axes, scene, (x, y, yaw), colours.SHELL, 6)
+        for row in {decisive_row(rollout), len(rollout.t) - 1}:
+            x, y, yaw = rollout.pose[row].tolist()
+            _draw_robot(axes, scene, (x, y, yaw), colours.SHELL, 6)
     draw_legend(axes, [*handles, *draw_contact(axes, scene, rollout)], scene)
 
 
@@ -237,15 +239,16 @@ def covering(
     return np.asarray(1000.0 * (clashes + outside) + covered)
 
 
-def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats) -> None:
-    """Draw a planner's field (R, C), such as pheromone or a potential, as coloured cells below the map."""
+def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats, name: str) -> bool:
+    """Draw a planner's field (R, C) as coloured cells below the map; return False, without a drawing, if it is constant."""
     values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
     finite = values[np.isfinite(values)]
-    if not len(finite):
-        return
+    low, high = np.quantile(finite, (0.02, 0.995)) if len(finite) else (0.0, 0.0)
+    if high - low <= ROUNDING * max(abs(low), abs(high)):
+        return False
     (rows, cols), (x, y), half = grid.shape, grid.origin, grid.cell / 2
     extent = (x - half, x + (cols - 0.5) * grid.cell, y - half, y + (rows - 0.5) * grid.cell)
-    low, high = np.quantile(finite, (0.02, 0.995))
-    scale: dict[str, Any] = {"cmap": FIELD, "vmin": low, "vmax": max(high, low + 1e-12)}
-    image = axes.imshow(values, origin="lower", extent=extent, zorder=0.5, interpolation="nearest", **scale)
-    colour_bar(figure, image, axes, "planner's final field")
+    scale: dict[str, Any] = {"cmap": FIELD, "vmin": low, "vmax": high, "interpolation": "nearest"}
+    image = axes.imshow(values, origin="lower", extent=extent, zorder=0.5, **scale)
+    colour_bar(figure, image, axes, name)
+    return True

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
 POINTS = 80  # of a curve
 RESAMPLES = 500  # bootstrap resamples for the intervals
+MANY = 4  # curves of a panel whose bands are pale
 NO_PATH = 1e9  # represents infinity in medians
+ON_HEAT = "#1c1c1c", "#fefefe"  # text on the light and the dark cells of a heat map, the same on every page
 HIGHEST = 6.0  # upper end of the length axis, as a multiple of the optimum
 
 
@@ -133,20 +135,25 @@ def sweep_figure(
         for k, elitism in enumerate((True, False)):
             title = "with elitism" if elitism else "without elitism"
             axes: Any = figure.add_subplot(1, 2, k + 1, label=title)
-            values = np.asarray(lengths[elitism])
-            drawn = axes.imshow(
-                values, origin="lower", cmap="cividis_r", vmin=finite.min(), vmax=finite.max(), aspect="auto"
-            )
-            axes.set_xticks(range(len(pm)), [f"{p:g}" for p in pm])
-            axes.set_yticks(range(len(pc)), [f"{p:g}" for p in pc])
+            drawn = draw_heat_map(axes, np.asarray(lengths[elitism]), pc, pm, (finite.min(), finite.max()))
             axes.set(xlabel="mutation probability Pm", ylabel="crossover probability Pc", title=title)
-            axes.grid(False)
-            for (i, j), value in np.ndenumerate(values):
-                dark = value > (finite.min() + finite.max()) / 2
-                words, colour = f"{value:.2f}" if math.isfinite(value) else "–", "white" if dark else hexed(INK)
-                axes.text(j, i, words, ha="center", va="center", fontsize=7.5, color=colour)
         colour_bar(figure, drawn, figure.axes, "mean path length [cells]", shrink=0.85, aspect=26, pad=0.05)
     return figure
+
+
+def draw_heat_map(
+    axes: Any, values: Floats, rows: Sequence[Any], columns: Sequence[Any], limits: tuple[float, float]
+) -> Any:
+    """Draw values (R, C) as labelled cells of a heat map with these colour limits; return it for a colour bar."""
+    low, high = limits
+    drawn = axes.imshow(values, origin="lower", cmap="cividis_r", vmin=low, vmax=high, aspect="auto")
+    for ticks, names in ((axes.set_yticks, rows), (axes.set_xticks, columns)):
+        ticks(range(len(names)), [f"{name:g}" if isinstance(name, float) else str(name) for name in names])
+    axes.grid(False)
+    for (i, j), value in np.ndenumerate(values):
+        text = f"{value:.3g}" if math.isfinite(value) else "–"
+        axes.text(j, i, text, ha="center", va="center", fontsize=7.5, color=ON_HEAT[int(value > (low + high) / 2)])
+    return drawn
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -157,10 +164,11 @@ class ConvergenceCurve:
     style: LabelStyle
     best: Sequence[Floats]  # best length so far by iteration, for each run [cells]; inf before the first path
     maps: Ints  # index of each run's map (N,)
-    # ant steps of each run (N,), spread evenly over its iterations; None: the axis counts iterations
-    steps: Floats | None
+    # effort of each run (N,) in the unit of `x`, spread evenly over its iterations; None: the axis counts iterations
+    spent: Floats | None
     optimum: float  # shortest length [cells]
-    printed: float | None  # the paper's length [cells], if any
+    printed: float | None = None  # the paper's length [cells], if any
+    x: str = "iteration"  # label of the axis
 
 
 def convergence_figure(
@@ -170,20 +178,23 @@ def convergence_figure(
     across = 2 if len(curves) == 4 else min(len(curves), 3)
     with sheet(path, (3.9 * across, 3.2 * -(-len(curves) // across))) as figure:
         for k, (title, on_map) in enumerate(curves.items()):
-            axes: Any = figure.add_subplot(-(-len(curves) // across), across, k + 1, label=title)
-            spans = [_draw(axes, curve, number, on_map, single) for number, curve in enumerate(on_map)]
-            optimum = on_map[0].optimum
-            axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest")
-            counted = on_map[0].steps is not None
-            axes.set(
-                title=title, xlabel="million ant steps" if counted else "iteration", ylabel="best path so far [cells]"
-            )
-            low = min([optimum, *(span[0] for span in spans)])
-            top = min(max(span[1] for span in spans), HIGHEST * optimum)
-            axes.set_ylim(low - 0.06 * (top - low) - 0.1, top + 0.06 * (top - low) + 0.1)
-            axes.set_xlim(left=0.0)
-            axes.legend(loc="best", fontsize=7)
+            axes: Any = figure.add_subplot(-(-len(curves) // across), across, k + 1, label=title, title=title)
+            draw_convergence(axes, on_map, single=single)
+            axes.set_ylabel("best path so far [cells]")
     return figure
+
+
+def draw_convergence(axes: Any, curves: Sequence[ConvergenceCurve], *, single: bool = False) -> None:
+    """Draw the curves of one panel: the median over runs and its interval over maps, or a single run."""
+    spans = [_draw(axes, curve, number, curves, single) for number, curve in enumerate(curves)]
+    optimum = curves[0].optimum
+    axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest")
+    low = min([optimum, *(span[0] for span in spans)])
+    top = min(max(span[1] for span in spans), HIGHEST * optimum)
+    axes.set_ylim(low - 0.06 * (top - low) - 0.02 * optimum, top + 0.06 * (top - low) + 0.02 * optimum)
+    axes.set_xlim(left=0.0)
+    axes.set_xlabel(curves[0].x)
+    axes.legend(loc="best", fontsize=7)
 
 
 def _draw(
@@ -191,26 +202,32 @@ def _draw(
 ) -> tuple[float, float]:
     """Draw a curve and return the smallest and the largest length to show."""
     colour, dash = curve.style.light, curve.style.dash
-    scale = 1.0 if curve.steps is None else 1e-6
     if single:
         run = _typical(curve)
-        taken = None if curve.steps is None else curve.steps[run : run + 1]
+        taken = None if curve.spent is None else curve.spent[run : run + 1]
         x = _grid([curve.best[run]], taken)
         middle = _sampled([curve.best[run]], taken, x)[0]
         low = high = middle
     else:
-        x = _grid(curve.best, curve.steps)
-        values = np.minimum(_sampled(curve.best, curve.steps, x), NO_PATH)
+        x = _grid(curve.best, curve.spent)
+        values = np.minimum(_sampled(curve.best, curve.spent, x), NO_PATH)
         alone = len(set(curve.maps.tolist())) == 1
         maps = np.arange(len(values)) if alone else curve.maps
         middle = np.median(values, axis=0)
         low, high = np.array(medians_by_world(values, maps, RESAMPLES)).T
     known = middle < NO_PATH / 10
-    x = x * scale
     axes.plot(x[known], middle[known], color=colour, ls=dash, lw=1.8, label=curve.name, drawstyle="steps-post")
     if not single and len(curve.best) > 1:
         ceiling = np.minimum(high, HIGHEST * 2 * curve.optimum)
-        axes.fill_between(x[known], low[known], ceiling[known], step="post", color=colour, alpha=0.22, lw=0)
+        axes.fill_between(
+            x[known],
+            low[known],
+            ceiling[known],
+            step="post",
+            color=colour,
+            alpha=0.22 if len(among) < MANY else 0.08,
+            lw=0,
+        )
     if curve.printed is not None and len(x):
         label = "paper" if all(other.printed is None for other in among[:number]) else None
         axes.plot(x[-1], curve.printed, "s", ms=5, color=colour, mfc="white", clip_on=False, zorder=4, label=label)
@@ -226,20 +243,20 @@ def _typical(curve: ConvergenceCurve) -> int:
     return ends[(len(ends) - 1) // 2]
 
 
-def _grid(best: Sequence[Floats], steps: Floats | None) -> Floats:
-    """Return the sample positions (K,) of the runs' curves: iterations or ant steps."""
-    if steps is None:
+def _grid(best: Sequence[Floats], spent: Floats | None) -> Floats:
+    """Return the sample positions (K,) of the runs' curves: iterations or effort."""
+    if spent is None:
         longest = max(len(run) for run in best)
         return np.unique(np.linspace(1, longest, min(longest, POINTS)).round())
-    end = float(np.median(steps))
+    end = float(np.median(spent))
     return np.linspace(end / POINTS, end, POINTS)
 
 
-def _sampled(best: Sequence[Floats], steps: Floats | None, x: Floats) -> Floats:
+def _sampled(best: Sequence[Floats], spent: Floats | None, x: Floats) -> Floats:
     """Return the best length of each run at `x` (N, K); inf before the first path."""
     rows = []
     for k, run in enumerate(best):
-        each = 1.0 if steps is None else float(steps[k]) / max(1, len(run))
+        each = 1.0 if spent is None else float(spent[k]) / max(1, len(run))
         place = np.minimum(np.floor(x / each + 1e-9).astype(int), len(run)) - 1
         rows.append(np.where(place >= 0, run[place] if len(run) else math.inf, math.inf))
     return np.array(rows)

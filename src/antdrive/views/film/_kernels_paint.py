@@ -76,31 +76,19 @@ def _span(inv: Array, x: float, y: float, w: float, nx: float, ny: float) -> flo
 
 
 @kernel
-def lay_floor(
-    rgb: Array,
-    ground: Array,
-    inside: Array,
-    inv: Array,
-    bounds: Array,
-    step: float,
-    weight: float,
-    colours: Array,
-) -> None:
-    """Paint the floor (H, W, 3) where `ground` is true, and set `inside` to the ground within the bounds.
+def lay_floor(rgb: Array, inside: Array, inv: Array, bounds: Array, step: float, weight: float, colours: Array) -> None:
+    """Paint the floor (H, W, 3), and set `inside` to the ground within the bounds.
 
     `colours` (3, 3): inside, outside and grid lines, which are `weight` pixels wide.
     """
     height, width = rgb.shape[0], rgb.shape[1]
     for row in range(height):
         for col in range(width):
-            inside[row, col] = False
-            if not ground[row, col]:
-                continue
             x, y, w = ground_at(inv, col + 0.5, row + 0.5)
             out = max(max(bounds[0] - x, x - bounds[2]), max(bounds[1] - y, y - bounds[3]))
             line = 0.0
+            inside[row, col] = out < 0.0
             if out < 0.0:
-                inside[row, col] = True
                 gap_x = abs(x / step - math.floor(x / step + 0.5)) * step
                 gap_y = abs(y / step - math.floor(y / step + 0.5)) * step
                 line_x = (0.5 + 0.5 * weight) - gap_x / _span(inv, x, y, w, 1.0, 0.0)
@@ -294,10 +282,11 @@ def put_bodies(
     y0: int,
     factor: int,
     ghost: float,
+    strength: float,
 ) -> None:
     """Blend a crop, rendered `factor` times as fine, into `frame` at x0, y0, where its depth `z` is below `depth`.
 
-    Elsewhere the crop is hidden, and shines through with the strength `ghost`.
+    Elsewhere the crop is hidden, and shines through with `ghost` times its `strength`.
     """
     count = factor * factor
     rows, cols = z.shape[0] // factor, z.shape[1] // factor
@@ -309,9 +298,9 @@ def put_bodies(
                     r, c = row * factor + i, col * factor + j
                     if seg[r, c] < 0:
                         continue
-                    weight = 1.0
+                    weight = strength
                     if z[r, c] >= depth[y0 * factor + r, x0 * factor + c]:
-                        weight = ghost
+                        weight *= ghost
                     seen += weight
                     red += weight * image[r, c, 0]
                     green += weight * image[r, c, 1]
@@ -322,6 +311,45 @@ def put_bodies(
                 frame[y, x, 0] = np.uint8((frame[y, x, 0] * rest + red) / count + 0.5)
                 frame[y, x, 1] = np.uint8((frame[y, x, 1] * rest + green) / count + 0.5)
                 frame[y, x, 2] = np.uint8((frame[y, x, 2] * rest + blue) / count + 0.5)
+
+
+@kernel
+def sample_sheet(rgb: Array, inv: Array, sheet: Array, x0: float, y0: float, texel: float) -> None:
+    """Paint the ground (H, W, 3) from a sheet (R, C, 3) whose texel (0, 0) has its corner at x0, y0 [m], between texels."""
+    for row in range(rgb.shape[0]):
+        for col in range(rgb.shape[1]):
+            x, y, _ = ground_at(inv, col + 0.5, row + 0.5)
+            u = min(max((x - x0) / texel - 0.5, 0.0), sheet.shape[1] - 1.001)
+            v = min(max((y - y0) / texel - 0.5, 0.0), sheet.shape[0] - 1.001)
+            c, r = int(u), int(v)
+            u, v = u - c, v - r
+            for k in range(3):
+                low = sheet[r, c, k] * (1.0 - u) + sheet[r, c + 1, k] * u
+                high = sheet[r + 1, c, k] * (1.0 - u) + sheet[r + 1, c + 1, k] * u
+                rgb[row, col, k] = np.uint8(low + (high - low) * v + 0.5)
+
+
+@kernel
+def put_on_floor(pixels: Array, visible: Array, image: Array, seg: Array, factor: int) -> None:
+    """Blend bodies, rendered `factor` times as fine, over the ground in `pixels` (H, W, 3); `visible`: its visible fraction."""
+    count = factor * factor
+    for row in range(visible.shape[0]):
+        for col in range(visible.shape[1]):
+            red, green, blue, seen = 0.0, 0.0, 0.0, 0
+            for i in range(factor):
+                for j in range(factor):
+                    r, c = row * factor + i, col * factor + j
+                    if seg[r, c] >= 0:
+                        seen += 1
+                        red += image[r, c, 0]
+                        green += image[r, c, 1]
+                        blue += image[r, c, 2]
+            visible[row, col] = 1.0 - seen / count
+            if seen > 0:
+                rest = count - seen
+                pixels[row, col, 0] = np.uint8((pixels[row, col, 0] * rest + red) / count + 0.5)
+                pixels[row, col, 1] = np.uint8((pixels[row, col, 1] * rest + green) / count + 0.5)
+                pixels[row, col, 2] = np.uint8((pixels[row, col, 2] * rest + blue) / count + 0.5)
 
 
 @kernel

@@ -55,6 +55,11 @@ class Camera:
         clip = [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)]
         return cls(view, np.array([[1 / tan_x, 0, 0, 0], [0, 1 / tan_y, 0, 0], clip, [0, 0, -1, 0]]), size)
 
+    @property
+    def is_turned(self) -> bool:
+        """Whether it looks along -x."""
+        return bool(abs(self.view[0, 0]) < 0.5)
+
     @cached_property
     def full(self) -> Floats:
         """World to clip space (4, 4)."""
@@ -89,6 +94,11 @@ class Camera:
         ndc = clip[:, :2] / clip[:, 3:]
         return np.column_stack([(1 + ndc[:, 0]) * width / 2, (1 - ndc[:, 1]) * height / 2])
 
+    def depths(self, points: Floats, towards: npt.ArrayLike = 0.0) -> Floats:
+        """Return the depth (N,) of points (N, 3), moved `towards` the camera [m], as `draw_solids` gives it."""
+        ahead = np.maximum(points @ self.full[3, :3] + self.full[3, 3] - np.asarray(towards), 1e-9)
+        return np.asarray((1 - self.projection[2, 2]) / 2 + self.projection[2, 3] / 2 / ahead)
+
     def sees(self, centres: Floats, radii: Floats) -> Flags:
         """Return which balls at centres (N, 3) with radii (N,) [m] may be visible; balls behind the camera are not."""
         x, y, z = (centres @ self.view[:3, :3].T + self.view[:3, 3]).T
@@ -105,13 +115,16 @@ class Camera:
         return Camera(self.view @ shift, self.projection, self.size)
 
 
-def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float, size: tuple[int, int]) -> Camera:
-    """Return the named camera that shows a ground rectangle and the bodies on it."""
+def camera_for(
+    name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float, size: tuple[int, int], turned: bool | None = None
+) -> Camera:
+    """Return the named camera that shows a ground rectangle and the bodies on it; None: `turned` if that fills the picture."""
     (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     corners = np.array([(x, y, z) for x in (x0, x1) for y in (y0, y1) for z in (0.0, height)])
     tilt, fov = _TILT[name], _FOV[name]
     shape = (x1 - x0) / ((y1 - y0) * math.sin(math.radians(tilt)))
-    return Camera.framing(corners, size, tilt=tilt, fov=fov, turned=name != "follow" and turns(shape, size))
+    turned = name != "follow" and turns(shape, size) if turned is None else turned
+    return Camera.framing(corners, size, tilt=tilt, fov=fov, turned=turned)
 
 
 def turns(shape: float, size: tuple[int, int]) -> bool:

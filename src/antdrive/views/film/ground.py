@@ -5,34 +5,73 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base.plane import segment_lengths
 from antdrive.base.types import Floats
 from antdrive.views.colours import GOAL, GRID, GROUND, PAPER, ROUTE, START, ZONE, Colour
 from antdrive.views.film import _kernels_paint as kernels
-from antdrive.views.film.camera import Camera
+from antdrive.views.film.camera import Camera, Picture
 from antdrive.views.scene import Scene
-
-Mask = npt.NDArray[np.bool_]
 
 SHADOW_DEPTH = 0.30  # fraction of the light that the deepest shadow removes
 SHADOW_TINT = (1.0, 0.94, 0.80)  # of red, green and blue: outdoor shadows are slightly blue
 RING_SIDES = 64  # of a circle
+SHEET = 0.6  # distance between sheets of a moving camera, as a fraction of the visible ground
 
 
-def paint_ground(
-    camera: Camera, scene: Scene, route: Floats, ground: Mask, tall: Floats, sun: tuple[float, float]
-) -> npt.NDArray[np.float32]:
-    """Paint the ground (H, W, 3) for a camera."""
-    width, height = camera.size
-    brush = _Brush(camera, ground)
+class GroundPainter:
+    """Painter of the ground below a camera: a whole picture, or around a moving camera a sheet that its frames sample."""
+
+    def __init__(self, camera: Camera, scene: Scene, route: Floats, tall: Floats, sun: tuple[float, float]) -> None:
+        self._camera, self._scene, self._route, self._tall, self._sun = camera, scene, route, tall, sun
+        self._step, self._sheets = grid_step(camera), dict[tuple[int, int], tuple[Picture, float, float]]()
+        width, height = camera.size
+        corners = np.array([(x, y, 1.0) for x in (0, width) for y in (0, height)]) @ np.linalg.inv(camera.ground).T
+        seen = corners[:, :2] / corners[:, 2:]
+        self._low, self._high = seen.min(axis=0), seen.max(axis=0)  # of the visible ground [m]
+
+    def paint(self, camera: Camera) -> Picture:
+        """Paint the ground (H, W, 3) of a camera, with the grid of the first."""
+        arrays = self._scene, self._route, self._tall, self._sun
+        return _paint_ground(camera.size, camera.ground, camera.pixel, self._step, *arrays)
+
+    def paint_moved(self, camera: Camera, moved: tuple[float, float]) -> Picture:
+        """Paint the ground (H, W, 3) of the painter's camera, moved along the ground [m], from a sheet."""
+        texel, stride = 1.25 * self._camera.pixel, SHEET * (self._high - self._low)
+        place = np.floor(np.array(moved) / stride)
+        key = (int(place[0]), int(place[1]))
+        if key not in self._sheets:
+            for old in list(self._sheets)[:-1]:
+                del self._sheets[old]
+            low, high = self._low + place * stride, self._high + (place + 1) * stride
+            forward = np.array([(1 / texel, 0, -low[0] / texel), (0, 1 / texel, -low[1] / texel), (0, 0, 1)])
+            width, height = np.ceil((high - low) / texel).astype(int).tolist()
+            arrays = self._scene, self._route, self._tall, self._sun
+            sheet = _paint_ground((width, height), forward, texel, self._step, *arrays)
+            self._sheets[key] = sheet, float(low[0]), float(low[1])
+        picture = np.empty((*camera.size[::-1], 3), dtype=np.uint8)
+        kernels.sample_sheet(picture, np.linalg.inv(camera.ground), *self._sheets[key], texel)
+        return picture
+
+
+def _paint_ground(
+    size: tuple[int, int],
+    forward: Floats,
+    pixel: float,
+    step: float,
+    scene: Scene,
+    route: Floats,
+    tall: Floats,
+    sun: tuple[float, float],
+) -> Picture:
+    """Paint the ground (H, W, 3) in pixels of a width [m], with grid lines every `step` [m]."""
+    width, height = size
+    brush = _Brush(size, forward)
     under = kerb_width(scene) / 2  # the kerb hides the floor's edge
     bounds = np.array(scene.bounds) + np.array([-under, -under, under, under])
-    step = grid_step(camera)
     tints = np.array([GROUND, PAPER, GRID], dtype=np.float64)
-    kernels.lay_floor(brush.rgb, ground, brush.inside, brush.inverse, bounds, step, 1.0, tints)
-    line = 1.5 * camera.pixel
+    kernels.lay_floor(brush.rgb, brush.inside, brush.inverse, bounds, step, 1.0, tints)
+    line = 1.5 * pixel
     if scene.has_no_go_area:
         brush.zones(scene, line)
     shade = np.ones((height, width), dtype=np.float32)
@@ -45,7 +84,7 @@ def paint_ground(
         brush.capsules(dashes(route, line), ROUTE, 0.85)
     brush.start(scene, line)
     brush.goal(scene, line)
-    return brush.rgb
+    return (brush.rgb + np.float32(0.5)).astype(np.uint8)
 
 
 def kerb_width(scene: Scene) -> float:
@@ -90,11 +129,10 @@ def dashes(line: Floats, width: float) -> Floats:
 class _Brush:
     """Colours of the ground, and a coverage mask through which shapes are painted."""
 
-    def __init__(self, camera: Camera, ground: Mask) -> None:
-        width, height = camera.size
-        self.forward = camera.ground
-        self.inverse = np.linalg.inv(self.forward)
-        self.inside = np.empty_like(ground)  # the ground within the world's bounds
+    def __init__(self, size: tuple[int, int], forward: Floats) -> None:
+        width, height = size
+        self.forward, self.inverse = forward, np.linalg.inv(forward)
+        self.inside = np.empty((height, width), dtype=np.bool_)  # the ground within the world's bounds
         self.rgb = np.zeros((height, width, 3), dtype=np.float32)
         self.cover = np.zeros((height, width), dtype=np.float32)
 

@@ -23,6 +23,7 @@ VEIL, LINES = 0.62, 0.75  # opacity of the veil over unknown ground and of its h
 PALENESS = 0.80  # of undetected obstacles
 TINT, BEAMS = 0.13, 0.30  # opacity of the scanned area and of the beams
 DRAWN_BEAMS = 90  # maximum number of drawn beams in a full circle
+HIT_DEPTH = 0.06  # a hit is hidden if it lies farther behind a surface [m]
 HATCHING = 9.0  # spacing of the hatching [px]
 
 
@@ -43,15 +44,23 @@ class Backdrop:
         return self.camera.ground
 
     @cached_property
+    def _everywhere(self) -> npt.NDArray[np.float32]:
+        return np.ones_like(self.visible)
+
+    @cached_property
     def inverse(self) -> Floats:
         """Homography (3, 3) from pixels to the ground."""
         return np.asarray(np.linalg.inv(self.forward))
 
-    def blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float, *, over: bool = False) -> None:
-        """Blend capsules (N, 5) of one colour into the ground of a frame, or over all bodies."""
-        visible = np.ones_like(self.visible) if over else self.visible
-        tint = np.array(colour, dtype=np.float64)
-        painting.blend_capsules(frame, visible, self.forward, self.inverse, rows, tint, strength)
+    def blend(
+        self, frame: Picture, rows: Floats, colour: Colour, strength: float, *, height: float | None = None
+    ) -> None:
+        """Blend capsules (N, 5) of one colour into the ground of a frame, or at a height [m] over all bodies."""
+        visible, forward, inverse = self.visible, self.forward, self.inverse
+        if height is not None:
+            visible, forward = self._everywhere, self.camera.plane(height)
+            inverse = np.asarray(np.linalg.inv(forward))
+        painting.blend_capsules(frame, visible, forward, inverse, rows, np.array(colour, dtype=np.float64), strength)
 
 
 class BeamPainter:
@@ -111,10 +120,15 @@ class OwnMapPainter(BeamPainter):
             kernels.pale_bodies(frame, visible, backdrop.bodies, fine, unmet, tints[0], PALENESS)
 
     def draw_hits(self, frame: Picture, backdrop: Backdrop) -> None:
-        """Draw the hits of the occupancy map over all bodies, at the height of the beams."""
-        camera = backdrop.camera
-        plane = camera.plane(min(self._reconstruction.lidar.height, 0.3))
-        places, radii = self._discs[:, :2], np.maximum(self._discs[:, 2], 1.1 * camera.pixel)
-        everywhere, colour = np.ones_like(backdrop.visible), np.array(HIT, dtype=np.float64)
-        rows = capsules(places, places, radii)
-        painting.blend_capsules(frame, everywhere, plane, np.linalg.inv(plane), rows, colour, 0.9)
+        """Draw the hits of the occupancy map that no body hides, at the height of the beams."""
+        camera, height = backdrop.camera, min(self._reconstruction.lidar.height, 0.3)
+        points = np.column_stack([self._discs[:, :2], np.full(len(self._discs), height)])
+        cols, rows = camera.pixels(points).T
+        depth = camera.depths(points, towards=self._discs[:, 2] + HIT_DEPTH)
+        high, wide = backdrop.visible.shape
+        inside = (cols >= 0) & (rows >= 0) & (cols < wide) & (rows < high)
+        fine = backdrop.depth.shape[0] // high
+        at = (fine * rows[inside]).astype(int), (fine * cols[inside]).astype(int)
+        hits = self._discs[inside][depth[inside] <= backdrop.depth[at]]
+        drawn = capsules(hits[:, :2], hits[:, :2], np.maximum(hits[:, 2], 1.1 * camera.pixel))
+        backdrop.blend(frame, drawn, HIT, 0.9, height=height)

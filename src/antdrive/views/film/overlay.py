@@ -1,30 +1,37 @@
-"""Text over a film's picture: a band of names and numbers below it, the legend, and the outcome at the end."""
+"""Text of a film: a band of names, numbers and the legend above the picture, and the outcome at the end."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 from PIL import Image, ImageDraw
 
+from antdrive.base.types import Floats
 from antdrive.sim.log.outcome import Outcome
 from antdrive.views import colours
 from antdrive.views.film.camera import Picture
 from antdrive.views.film.playback import SLOW_MOTION
-from antdrive.views.film.text import Sprite, fitted, font, pill, plate, put, text_width, wrapped
+from antdrive.views.film.text import Sprite, fitted, font, pill, put, text_width, wrapped
 from antdrive.views.scene import Scene
 
 DRIVING = ("DRIVING", colours.CALM)
 PLANNING = ("PLANNING", colours.CALM)
+ENDED = ("END", colours.CALM)
 SLOWED = (f"SLOW ×1/{SLOW_MOTION:g}", colours.BAD)
 
 #: Names of the band's four numbers during drive and planning.
 DRIVE_FIELDS = ("TIME", "SPEED", "CLEARANCE", "MINIMUM")
-PLAN_FIELDS = ("ITERATION", "BEST PATH", "MEAN PATH", "ARRIVED")
+PLAN_FIELDS = ("ITERATION", "BEST SO FAR", "FOUND AT", "ARRIVED")
 
 #: Heights of a legend row in the band and of its edge [units].
 LEGEND_ROW, LEGEND_EDGE = 1.5, 0.4
+
+#: Height of a drive's row [units].
+DRIVE_ROW = 1.6
 
 #: Notes below the numbers: line height [units], largest number of lines, font size [units].
 NOTE_LINE, MOST_NOTES, NOTE_FONT = 1.2, 3, 0.86
@@ -53,13 +60,14 @@ class Layout:
     width: int  # of the frame [px]
     unit: int  # height of small text [px]
     wide: bool  # whether names, numbers and outcome stand side by side
-    rows: int  # legend rows in the band; 0: the legend is a card in the picture's corner
+    rows: int  # legend rows in the band
     height: int  # of the band [px]
     note: tuple[str, ...] = ()  # lines of a note too long for the space beside the numbers
+    drives: int = 0  # rows of drives
 
     @classmethod
-    def of(cls, size: tuple[int, int], rows: int, note: str = "") -> Layout:
-        """Return the layout of a frame of a size (width, height) [px] with legend rows and a note."""
+    def of(cls, size: tuple[int, int], rows: int, note: str = "", drives: int = 0) -> Layout:
+        """Return the layout of a frame of a size (width, height) [px] with legend rows, a note and rows of drives."""
         width, height = size
         wide = width >= 1.5 * height and width >= 900
         unit = max(8, round(min(height / 46, width / (82 if wide else 56))))
@@ -68,8 +76,8 @@ class Layout:
         lines: list[str] = []
         if most > 0 and text_width(note, plain.small, True) > plain.note_room:
             lines = wrapped(note, width - 2 * unit, plain.small, True, most=most)
-        units = plain.numbers_units + NOTE_LINE * len(lines) + (LEGEND_EDGE + LEGEND_ROW * rows if rows else 0.0)
-        return cls(width, unit, wide, rows, 2 * round(units * unit / 2), tuple(lines))
+        units = plain.numbers_units + NOTE_LINE * len(lines) + DRIVE_ROW * drives + LEGEND_EDGE + LEGEND_ROW * rows
+        return cls(width, unit, wide, rows, 2 * round(units * unit / 2), tuple(lines), drives)
 
     @property
     def numbers_units(self) -> float:
@@ -95,7 +103,7 @@ class Layout:
 
 
 class Band:
-    """Band below the picture. Its constant content is drawn once, numbers and status when they change."""
+    """Band above the picture. Its constant content is drawn once, numbers and status when they change."""
 
     def __init__(
         self,
@@ -110,10 +118,10 @@ class Band:
         unit, width, wide = layout.unit, layout.width, layout.wide
         self._blank = Image.new("RGB", (width, layout.height), colours.BAND)
         draw = ImageDraw.Draw(self._blank)
-        draw.line([(0, 0), (width, 0)], fill=(210, 216, 225), width=max(1, unit // 8))
+        draw.line([(0, layout.height - 1), (width, layout.height - 1)], fill=(210, 216, 225), width=max(1, unit // 8))
         pad, big, small = unit, round(1.35 * unit), layout.small
         numbers, column = layout.fields
-        self._fields = [(numbers + k * column, round((0.75 if wide else 4.25) * unit)) for k in range(4)]
+        self._fields = [(numbers + k * column, round((0.75 if wide else 4.25) * unit)) for k in range(len(names))]
         shown = "" if layout.note else fitted(note or "", layout.note_room, small, True)
         room = numbers - 2 * pad if wide else width - _widest_status(unit) - 3 * pad
         subroom = room if wide else width - text_width(shown, small, True) - 3 * pad
@@ -127,22 +135,62 @@ class Band:
             draw.text((pad, middle), line, font=font(small, True), fill=colours.CALM, anchor="lm")
         for (x, y), name in zip(self._fields, names, strict=True):
             draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=colours.MUTED)
-        if layout.rows:
-            _draw_rows(draw, legend, layout)
-        self._shown: tuple[Values, tuple[str, colours.Colour]] | None = None
+        _draw_rows(draw, legend, layout)
+        self._shown: tuple[Values, tuple[str, colours.Colour], Sequence[DriveRow]] | None = None
         self._picture = np.array(self._blank)
 
-    def draw(self, values: Values, status: tuple[str, colours.Colour], out: Picture) -> None:
-        """Draw the band of one frame into `out` (h, W, 3), with its four numbers and its status."""
-        if (values, status) != self._shown:
-            self._shown = values, status
+    def draw(
+        self, values: Values, status: tuple[str, colours.Colour], out: Picture, drives: Sequence[DriveRow] = ()
+    ) -> None:
+        """Draw the band of one frame into `out` (h, W, 3), with its numbers, its status and a row per drive."""
+        if (values, status, drives) != self._shown:
+            self._shown = values, status, drives
             image, unit = self._blank.copy(), self.layout.unit
             draw, large = ImageDraw.Draw(image), font(round(1.4 * unit), True)
             for (x, y), (text, bad) in zip(self._fields, values, strict=True):
                 draw.text((x, y + 1.15 * unit), text, font=large, fill=colours.BAD if bad else colours.INK)
+            for k, row in enumerate(drives):
+                _draw_drive(draw, row, self.layout, k)
             self._picture, label = np.array(image), pill(status[0], round(1.08 * unit), status[1])
             put(self._picture, label, self.layout.width - unit - label.shape[1], 0.5 * unit)
         out[:] = self._picture
+
+
+class DriveRow(NamedTuple):
+    """Row of the band about one of several drives."""
+
+    names: str  # its planners
+    colour: colours.Colour
+    facts: tuple[str, ...]  # in columns
+    verdict: tuple[str, colours.Colour] | None = None  # once it has ended
+
+
+def _draw_drive(draw: ImageDraw.ImageDraw, row: DriveRow, layout: Layout, number: int) -> None:
+    """Draw a drive's row below the numbers."""
+    unit, width, size = layout.unit, layout.width, round(0.95 * layout.unit)
+    middle = (layout.numbers_units + NOTE_LINE * len(layout.note) + DRIVE_ROW * (number + 0.3)) * unit
+    draw.rounded_rectangle((unit, middle - 0.3 * unit, 3 * unit, middle + 0.3 * unit), 0.3 * unit, fill=row.colour)
+    stops = [
+        3.6 * unit,
+        *(part * width for part in ((0.2, 0.36, 0.5) if layout.wide else (0.22, 0.5, 0.5))),
+        width - unit,
+    ]
+    parts = [row.names, *row.facts[: 2 if layout.wide or row.verdict is None else 1]]
+    for k, text in enumerate(parts):
+        last = k + 1 == len(parts) and row.verdict is None
+        room = round((stops[-1] if last else stops[k + 1]) - stops[k] - 0.5 * unit)
+        shown = fitted(text, room, size, k == 0)
+        draw.text(
+            (stops[k], middle),
+            shown,
+            font=font(size, k == 0),
+            fill=colours.INK if k == 0 else colours.MUTED,
+            anchor="lm",
+        )
+    if row.verdict is not None:
+        text, colour = row.verdict
+        shown = fitted(text, round(width - unit - stops[3]), size, True)
+        draw.text((width - unit, middle), shown, font=font(size, True), fill=colour, anchor="rm")
 
 
 def _widest_status(unit: int) -> int:
@@ -163,13 +211,13 @@ def _metres(value: float) -> str:
 NO_GO = "no-go area for the robot's centre (radius + margin)"
 NO_GO_OUTLINED = "no-go area for the footprint (margin)"
 
-_WIDE_KINDS = ("ramp", "field", "line", "dash", "zone", "hatch")
+_WIDE_KINDS = ("field", "line", "dash", "zone", "hatch")
 
 
 class LegendEntry(NamedTuple):
     """Line of the legend."""
 
-    kind: str  # of the sample: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot`, `halo` or `scale`
+    kind: str  # of the sample: `field`, `line`, `dash`, `zone`, `hatch`, `dot`, `ring` or `scale`
     colour: colours.Colour  # of the sample
     text: str  # its meaning
     width: float = 0.0  # of a scale bar [px]
@@ -181,27 +229,22 @@ def legend_entries(
     pixel: float,
     *,
     planning: bool = False,
+    limiters: Sequence[tuple[npt.ArrayLike, str]] = (),
+    route: bool = True,
     replans: bool = False,
     beams: bool = False,
     own_map: bool = False,
     tracked: bool = False,
-    glow: bool = False,
-    routed: bool = True,
 ) -> list[LegendEntry]:
-    """Return the legend's entries, one for each kind of object in the picture."""
+    """Return the legend's entries, one for each kind of object in the picture; `limiters`: colours and names."""
     if planning:
-        entries = [
-            LegendEntry("field", colours.INK, "planner's field"),
-            LegendEntry("line", colours.SHELL, "best path so far"),
-        ]
+        entries = [LegendEntry("field", colours.INK, "planner's field")]
+        entries += [LegendEntry("line", colours.SHELL, "best path so far")] if route else []
     else:
-        speeds = f"speed, 0 to {scene.robot.max_speed:.3g} m/s"
-        entries = [LegendEntry("ramp", colours.INK, speeds)]
-        entries += [LegendEntry("dash", colours.ROUTE, "planned route")] if routed else []
-    if glow:
-        entries.append(LegendEntry("halo", colours.SHELL, "robot"))
+        entries = [LegendEntry("line", _colour(tint), f"speed: {name}") for tint, name in limiters]
+        entries += [LegendEntry("dash", colours.ROUTE, "planned route")] if route else []
     if replans:
-        entries.append(LegendEntry("dot", colours.ROUTE, "replan"))
+        entries.append(LegendEntry("ring", colours.ROUTE, "replan"))
     if scene.has_no_go_area:
         entries.append(LegendEntry("zone", colours.ZONE, NO_GO_OUTLINED if scene.outlined else NO_GO))
     if scene.unseen.any():
@@ -220,19 +263,16 @@ def legend_entries(
     return [*entries, LegendEntry("scale", colours.INK, f"{step:g} m (grid)", step / pixel)]
 
 
-def legend_card(entries: list[LegendEntry], layout: Layout) -> Sprite:
-    """Draw the legend as a card for the picture's corner."""
-    size = max(8, round(0.9 * layout.unit))
-    line, pad = round(1.55 * size), round(0.8 * size)
-    key = round(max(2.6 * size, *(entry.width for entry in entries)))
-    wide = 2 * pad + key + size // 2 + max(text_width(entry.text, size) for entry in entries)
-    image = plate(wide, 2 * pad + line * len(entries), (255, 255, 255), 222, radius=size // 2)
-    draw = ImageDraw.Draw(image)
-    for k, entry in enumerate(entries):
-        middle = pad + line * k + line / 2
-        _draw_sample(draw, entry, pad, middle, key, size)
-        draw.text((pad + key + size // 2, middle), entry.text, font=font(size), fill=colours.INK, anchor="lm")
-    return np.array(image)
+def limiter_tints(names: Sequence[str]) -> Floats:
+    """Return a colour (N, 3), 0 to 255, of the path under each speed-limiting rule; of the first, top speed, a muted one."""
+    tints = [colours.LIMITER_COLOURS[k % len(colours.LIMITER_COLOURS)] for k in range(max(1, len(names)))]
+    rows = [[int(tint[i : i + 2], 16) for i in (1, 3, 5)] for tint in tints]
+    return np.array([colours.CRUISE, *rows[1:]], dtype=np.float64)
+
+
+def _colour(tint: npt.ArrayLike) -> colours.Colour:
+    red, green, blue = (int(value) for value in np.asarray(tint))
+    return red, green, blue
 
 
 class LegendRows(NamedTuple):
@@ -251,15 +291,14 @@ def legend_rows(entries: list[LegendEntry], layout: Layout) -> LegendRows:
     legend = LegendRows(0, [], False)
     for size in range(max(8, round(0.9 * layout.unit)), max(7, round(0.75 * layout.unit)) - 1, -1):
         room = float(layout.width - 2 * layout.unit)
-        rows: list[list[LegendEntry]] = [[]] if layout.rows else []
+        rows: list[list[LegendEntry]] = [[]]
         left = room
         for entry in entries:
             wide = sum(_entry_width(entry, size))
-            if rows and rows[-1] and wide > left:
+            if rows[-1] and wide > left:
                 rows.append([])
                 left = room
-            if rows:
-                rows[-1].append(entry)
+            rows[-1].append(entry)
             left -= wide + size
         legend = LegendRows(size, rows[: layout.rows], len(rows) <= layout.rows)
         if legend.whole:
@@ -292,9 +331,8 @@ def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float
     """Draw the sample of a legend entry, `wide` pixels wide, beside text of height `size`."""
     kind, colour = entry.kind, entry.colour
     r = 0.42 * size
-    if kind in ("ramp", "field"):
-        tints = colours.speed_colours if kind == "ramp" else colours.field_colours
-        for i, tint in enumerate(tints(np.linspace(0, 1, wide))):
+    if kind == "field":
+        for i, tint in enumerate(colours.field_colours(np.linspace(0, 1, wide))):
             draw.line([(x + i, y - 0.22 * size), (x + i, y + 0.22 * size)], fill=tuple(int(c) for c in tint))
     elif kind == "dash":
         for start in np.arange(x, x + wide - 1, wide / 3):
@@ -311,9 +349,9 @@ def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float
             draw.line([(at - high, y + high), (at + high, y - high)], fill=colour, width=max(1, size // 9))
     elif kind == "dot":
         draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=colour)
-    elif kind == "halo":
-        pale = tuple(round(255 + (c - 255) * 0.16) for c in colour)
-        draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=pale, outline=colour)
+    elif kind == "ring":
+        place = (x + wide / 2 - r, y - r, x + wide / 2 + r, y + r)
+        draw.ellipse(place, fill=colours.WHITE, outline=colour, width=max(2, size // 5))
     else:  # a scale bar
         line = max(1, size // 7)
         draw.line([(x, y), (x + entry.width, y)], fill=colour, width=line)

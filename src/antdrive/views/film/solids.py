@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -26,22 +27,21 @@ class Solid(NamedTuple):
     place: Floats  # rotation and, in the last column, position (3, 4) [m]
 
 
-def placed(at: tuple[float, float, float], quaternion: tuple[float, float, float, float]) -> Floats:
-    """Return the transform (3, 4) of a rotation followed by a translation."""
-    x, y, z, w = quaternion
-    return np.array(
-        [
-            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), at[0]),
-            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), at[1]),
-            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), at[2]),
-        ]
-    )
+def placed(x: float, y: float, yaw: float = 0.0) -> Floats:
+    """Return the transform (3, 4) to a pose on the ground."""
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return np.array([(cosine, -sine, 0.0, x), (sine, cosine, 0.0, y), (0.0, 0.0, 1.0, 0.0)])
 
 
 def draw_solids(
-    solids: Iterable[Solid], camera: Camera, box: Box, fine: int, light: tuple[float, float, float]
+    solids: Sequence[Solid],
+    camera: Camera,
+    box: Box,
+    fine: int,
+    light: tuple[float, float, float],
+    numbers: Iterable[int] | None = None,
 ) -> tuple[Any, Any, Any]:
-    """Draw picture (h, w, 3), depth (h, w), 1 for ground, and index of the visible solid (h, w), -1 for none."""
+    """Draw picture (h, w, 3), depth (h, w), 1 for ground, and the visible solid's number, or index, (h, w), -1 for none."""
     x0, y0, x1, y1 = box
     high, wide = (y1 - y0) * fine, (x1 - x0) * fine
     image = np.zeros((high, wide, 3), dtype=np.uint8)
@@ -57,7 +57,7 @@ def draw_solids(
     )
     scale = np.array([(1 - projection[2, 2]) / 2, projection[2, 3] / 2, AMBIENT, DIFFUSE])
     common = lens, scale, np.array(light)
-    for number, (mesh, colour, place) in enumerate(solids):
+    for number, (mesh, colour, place) in zip(numbers or range(len(solids)), solids, strict=True):
         tint = np.array(colour, dtype=np.float64)
         triangles.draw_mesh(*target, *common, place, mesh.vertices, mesh.normals, mesh.triangles, tint, number)
     return target

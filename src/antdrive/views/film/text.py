@@ -100,33 +100,3 @@ def plate(width: int, height: int, colour: Colour, alpha: int, *, radius: int) -
     image = Image.new("RGBA", (width, height), (*colour, 0))
     image.putalpha(mask.reduce(fine))
     return image
-
-
-def burst(size: int, colour: Colour) -> Sprite:
-    """Return the mark of a contact: a ring with rays."""
-    fine = 4
-    wide = size * fine
-    image = Image.new("RGBA", (wide, wide), (*colour, 0))
-    draw = ImageDraw.Draw(image)
-    middle, reach = wide / 2, wide / 2 - fine
-    for rim, fill in ((0.20, (255, 255, 255, 235)), (0.12, (*colour, 255))):
-        for k in range(8):
-            angle = (k + 0.5) * np.pi / 4
-            ray = np.array([np.cos(angle), np.sin(angle)])
-            a, b = middle + 0.66 * reach * ray, middle + (0.99 if rim < 0.2 else 1.0) * reach * ray
-            draw.line([tuple(a), tuple(b)], fill=fill, width=max(1, round(rim * reach)))
-        r, line = 0.52 * reach + rim * reach / 2, max(1, round(rim * reach))
-        draw.ellipse((middle - r, middle - r, middle + r, middle + r), outline=fill, width=line)
-    return np.asarray(image.resize((size, size), Image.Resampling.LANCZOS))
-
-
-@functools.cache
-def glow(size: int, colour: Colour) -> Sprite:
-    """Return a soft disc with a thin rim."""
-    along = (np.arange(size) + 0.5) / size * 2 - 1
-    away = np.hypot(along[:, None], along)
-    rim = np.clip(1 - np.abs(away - 0.9) * size / 3, 0, 1)
-    sprite = np.empty((size, size, 4), dtype=np.uint8)
-    sprite[..., :3] = colour
-    sprite[..., 3] = 255 * np.maximum(0.75 * rim, np.where(away < 0.9, 0.16, 0.0))
-    return sprite
