@@ -57,6 +57,15 @@ def map_to_world(frame: Pose, points: npt.ArrayLike) -> Floats:
     return world_to_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
 
 
+def poses_at(moments: Floats, t: Floats, pose: Floats, beyond: float | None = None) -> Floats:
+    """Return poses (T, 3) at times `t` (T,) interpolated at other times (N,), with unwrapped headings, shape (N, 3).
+
+    Beyond the ends of `t` they are held, or all values are `beyond`.
+    """
+    turned = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
+    return np.stack([np.interp(moments, t, column, beyond, beyond) for column in turned.T], axis=-1)
+
+
 def end_in_world(frame: Pose, end: Any) -> Any:
     """Transform a start or a goal, or None, from the map's frame to the world's."""
     return tuple(map_to_world(frame, [end])[0].tolist()) if end is not None and any(frame) else end

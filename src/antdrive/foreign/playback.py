@@ -17,7 +17,7 @@ import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.files import write_json
-from antdrive.base.plane import wrap_angle
+from antdrive.base.plane import poses_at, wrap_angle
 from antdrive.base.types import Floats, Point
 from antdrive.base.version import versions
 from antdrive.foreign.certificate import ForeignCertificate
@@ -134,8 +134,7 @@ def foreign_run(found: ForeignCertificate, setup: ForeignSetup, goal: Point | No
 def _at(t: Floats, track: Track) -> Floats:
     """Return a track's poses at times, held before and after it (T, 3)."""
     known = np.isfinite(track.pose[:, 0])
-    turned = np.column_stack([track.pose[known, :2], np.unwrap(track.pose[known, 2])])
-    pose = np.stack([np.interp(t, track.t[known], column) for column in turned.T], axis=1)
+    pose = poses_at(t, track.t[known], track.pose[known])
     return np.column_stack([pose[:, :2], wrap_angle(pose[:, 2])])
 
 

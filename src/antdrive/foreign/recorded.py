@@ -10,7 +10,7 @@ import numpy as np
 
 from antdrive.base.bags import Bag, readable
 from antdrive.base.errors import FieldError, input_error
-from antdrive.base.plane import map_to_world
+from antdrive.base.plane import map_to_world, poses_at
 from antdrive.foreign.frames import ROBOTS
 from antdrive.foreign.log import read_log
 from antdrive.robots.importing.hull import convex_hull
@@ -69,8 +69,7 @@ def read_footprint(path: Path, topic: str, *, pose: str | None = None, robot_fra
         log = read_log(path, pose=pose, map_frame=frame, robot_frame=robot_frame)
         t = stamps - log.start
         known = (t >= 0) & (t <= log.t[-1])
-        columns = (log.pose[:, 0], log.pose[:, 1], np.unwrap(log.pose[:, 2]))
-        poses = np.column_stack([np.interp(t[known], log.t, column) for column in columns])
+        poses = poses_at(t[known], log.t, log.pose)
         corners = np.array([map_to_world(tuple(at), some) for at, some in zip(poses, corners[known], strict=True)])
     if not len(corners) or not np.isfinite(corners).all() or np.ptp(corners, axis=0).max(initial=0) > SPREAD:
         raise input_error(str(path), f"the polygon on {topic} is nowhere known or changes by more than {SPREAD:g} m")

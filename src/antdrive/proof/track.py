@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.plane import segment_lengths, wrap_angle
+from antdrive.base.plane import poses_at, segment_lengths, wrap_angle
 from antdrive.base.types import Floats
 from antdrive.proof.distances import to_outline, to_world
 from antdrive.robots.spec import Footprint, RobotSpec
@@ -91,8 +91,7 @@ class Track:
             error: that of the track [m]
         """
         rows, r = t if at is None else at, robot.footprint.radius
-        turned = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
-        placed = np.stack([np.interp(rows, t, column, math.nan, math.nan) for column in turned.T], axis=1)
+        placed = poses_at(rows, t, pose, math.nan)
         h, length, turn = np.diff(t), segment_lengths(pose[:, :2]), np.abs(wrap_angle(np.diff(pose[:, 2])))
         lost = np.zeros(len(h), dtype=bool) if unknown is None else unknown
         # Mean speeds over the step before, nan if unknown; fmin takes a limit then.
