@@ -108,12 +108,13 @@ def test_the_suite_that_init_writes_passes_and_speaks_of_no_drive(folder, antdri
     said = [out, (folder / "field.drive.yaml").read_text()]
     assert "Guessed, to be reviewed: robot, pose, map_frame, robot_frame" in said[1]
     assert "map_frame: map\n" in said[1]
-    for words in ("accept", "check --film always --results results --junit junit.xml", "check --json"):
+    for words in ("accept", "check --keep --results results --junit junit.xml", "check --json"):
         code, out, _ = antdrive(*words.split(), "field.drive.yaml")
         assert code == 0, out
         said.append(out)
     written = [one for one in folder.rglob("*") if one.suffix in (".json", ".md", ".xml", ".txt", ".yaml")]
     assert {"certificate.json", "junit.xml", "page.md", "result.json"} <= {one.name for one in written}
+    assert len([*folder.rglob("drive.html")]) == 1
     assert not [*folder.rglob("rollout.npz")]
     for text in (*said, *(one.read_text() for one in written)):
         assert OURS not in text
@@ -126,7 +127,7 @@ def test_a_worse_log_fails_in_its_own_words(folder, antdrive):
     shutil.rmtree("drive")
     shutil.move("touched", "drive")
     shutil.move("touched.yaml", "drive.yaml")
-    code, out, _ = antdrive("check", "field.drive.yaml", "--film", "never")
+    code, out, _ = antdrive("check", "field.drive.yaml")
     assert code == 1
     assert "outcome: collided, expected succeeded (the robot touched obstacles[1]" in out
     assert "changed since the baseline: world, log" in out

@@ -21,7 +21,7 @@ WRITTEN: dict[str, tuple[Any, Any, list[str] | None]] = {
     "footprint": ("disc", "disc", ["--footprint", "disc"]),
     "map": ("none", "none", ["--map", "none"]),
     "localisation": ("matching", "matching", ["--localisation", "matching"]),
-    "odometry": (2.0, 2.0, ["--odometry", "2.0"]),
+    "odometry": (2.0, 2.0, ["--odometry", "2"]),
     "controller": (
         {"lookahead_time": 0.5}, "lookahead_time=0.5", ["--set", "controller.lookahead_time=0.5"]
     ),
@@ -31,7 +31,7 @@ WRITTEN: dict[str, tuple[Any, Any, list[str] | None]] = {
     "unseen": (
         [{"x": 1.0, "y": 2.0, "radius": 0.5, "height": 1.0}], "1,2,0.5", ["--unseen", "1.0,2.0,0.5"]
     ),
-    "time_limit": (9.0, 9.0, ["--time-limit", "9.0"]),
+    "time_limit": (9.0, 9.0, ["--time-limit", "9"]),
     "physics_hz": (120, 120, None),
     "control_hz": (30, 30, None),
     "seed": (7, 7, ["--seed", "7"]),

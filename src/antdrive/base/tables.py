@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 import sys
@@ -69,6 +70,11 @@ def _words(text: str, width: int) -> list[str]:
 def marked(good: bool, text: str) -> str:
     """Return a text, on a terminal with the sign of success or failure before it; the command line colours the sign."""
     return f"{GOOD if good else BAD} {text}" if sys.stdout.isatty() else text
+
+
+def rounded_down(value: float, digits: int) -> float:
+    """Round a lower bound down."""
+    return math.floor(value * 10**digits + 1e-6) / 10**digits if math.isfinite(value) else value
 
 
 def file_lines(files: Mapping[str, object]) -> Iterator[str]:

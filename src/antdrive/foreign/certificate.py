@@ -22,7 +22,7 @@ from antdrive.proof import Proof, Track, prove
 from antdrive.proof.track import PERIOD, bounded
 from antdrive.robots.clearance import footprint_distances
 from antdrive.robots.spec import RobotSpec
-from antdrive.sim.log.certificate import in_metres
+from antdrive.sim.log.certificate import at_least, in_metres
 from antdrive.worlds.world import World, obstacle_name
 
 #: Distance between interpolated rows, below which a finer proof gains little [m], and most of them between two poses.
@@ -124,7 +124,7 @@ class ForeignCertificate:
         )
         shows = self.shown_error == error > 0
         how = "at least {}, since they lie too far apart for top speeds" if shows else "up to {}, as stated"
-        off = f"poses are off by {how.format(in_metres(error))}; the robot is clear below {in_metres(self.most_error)}"
+        off = f"poses are off by {how.format(in_metres(error))}; the robot is clear below {at_least(self.most_error)}"
         reasons = {
             f"the robot touched {self.nearest}": self.touched,
             f"nothing can be said between t = {between}: there are no poses to rely on": self.bound == -math.inf,
@@ -179,7 +179,7 @@ class ForeignCertificate:
     @property
     def sentence(self) -> str:
         """Statement with its distances."""
-        least, most = in_metres(self.bound), in_metres(self.most_error)
+        least, most = at_least(self.bound), at_least(self.most_error)
         clear = f"by at least {least} at all times; it is clear for all pose errors below {most}"
         return f"{self.statement}: {clear if self.certified else self.problems[0]}"
 

@@ -102,7 +102,7 @@ class Form:
 
     def words(self, flag: str, value: Any) -> list[str] | None:
         """Return the options of `antdrive run` for a file's value; None if it has none."""
-        return [] if value is None else [flag, option_text(value)] if flag else None
+        return [] if value is None else [flag, word_text(value)] if flag else None
 
 
 class _Margin(Form):
@@ -279,6 +279,13 @@ def option_text(value: Any) -> str:
     if isinstance(value, list):
         return ",".join(map(option_text, value))
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def word_text(value: Any) -> str:
+    """Format a value as the shortest word of a command."""
+    if isinstance(value, list):
+        return ",".join(map(word_text, value))
+    return str(int(value)) if isinstance(value, float) and value.is_integer() else option_text(value)
 
 
 def file_fields(settings: Iterable[DeclaredSetting]) -> dict[str, Any]:

@@ -77,7 +77,7 @@ def no_path_reason(s: RoutePlanner, grid: Grid, said: str, finds_path: FindsPath
 def _narrowest_place(s: RoutePlanner, passage: Passage | None) -> str:
     """Describe the widest passable disc, its bottleneck, and the room that the robot needs there."""
     if passage is None:
-        return "not even a point gets through"
+        return "obstacles close off the goal from the start"
     task = s.task
     where = "between " + " and ".join(obstacle_name(task.world, k) for k in passage.between)
     if not passage.between:

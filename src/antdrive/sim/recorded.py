@@ -61,6 +61,14 @@ def command_of(record: DriveRecord) -> str | None:
         return None
 
 
+def command_in(record: DriveRecord) -> str:
+    """Return the `antdrive run` command that a log's written scenario means, unchecked; empty if there is none."""
+    try:
+        return written_of(record).command() or ""
+    except (FieldError, InputError):
+        return ""
+
+
 def false_words(record: DriveRecord, *, settings: bool = False) -> Iterator[str]:
     """Yield a sentence for every word in a log's written scenario that its record contradicts.
 

@@ -116,8 +116,8 @@ class Settings:
     footprint: str = setting(
         "auto",
         "the shape that plans keep clear: disc (the circle around the robot), exact (its footprint, which turns on the "
-        "spot and drives straight), or auto (the disc unless it has no way or one over 10 % longer; ants compare ways on the "
-        "world's cells)",
+        "spot and drives straight), or auto (the disc; the exact footprint where the disc's path is missing or over "
+        "10 % longer; ants compare paths on the world's cells)",
         "Planner",
         "auto|disc|exact",
         choices=FOOTPRINTS,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,8 @@ from antdrive.robots.spec import RobotSpec
 from antdrive.sim.facts import IN_RESULT, LoggedRun, result_of
 from antdrive.sim.log.consistency import wrong_optima
 from antdrive.sim.log.record import differences, hashes_of
-from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.recorded import false_words
+from antdrive.sim.log.rollout import Rollout, stated_by
+from antdrive.sim.recorded import command_in, false_words
 from antdrive.worlds.world import Task
 
 MAX_RESULT_BYTES = 10_000_000  # of a result.json
@@ -33,10 +34,10 @@ def read_result(path: Path) -> Mapping[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def false_claims(result: Mapping[str, Any], log: LoggedRun) -> Iterator[str]:
-    """Yield a sentence for every value in a `result.json` that the log contradicts. Missing keys are no contradiction."""
+def false_claims(result: Mapping[str, Any], log: LoggedRun, source: str = "result.json") -> Iterator[str]:
+    """Yield a sentence for every value in a `result.json` or a page that the log contradicts, but not for missing keys."""
     if result.get("digest") != log.rollout.digest:
-        yield "result.json: belongs to another log: its digest differs"
+        yield f"{source}: belongs to another log: its digest differs"
         return
     result = json.loads(as_json(result))  # with null for NaN and infinity
     for name, value in json.loads(as_json(result_of(log, COMPARED))).items():
@@ -46,7 +47,12 @@ def false_claims(result: Mapping[str, Any], log: LoggedRun) -> Iterator[str]:
             if inside and isinstance(known, Mapping) and isinstance(claimed.get(key), Mapping):
                 known = {one: known.get(one) for one in claimed[key]}  # options at their defaults are omitted
             if key in claimed and not _agree(claimed[key], known):
-                yield f"result.json: {f'{name}.' * inside}{key}: differs from the log, which says {_short(known)}"
+                yield f"{source}: {f'{name}.' * inside}{key}: differs from the log, which says {_short(known)}"
+
+
+def _meant(command: str) -> str:
+    """Return a command with its numbers in one notation."""
+    return re.sub(r"\d+\.?\d*", lambda number: repr(float(number[0])), command)
 
 
 def _agree(a: Any, b: Any) -> bool:
@@ -100,6 +106,15 @@ def verify_log(
         problems += wrong_optima(rollout.record)
     if result is not None and result.exists():
         problems += false_claims(read_result(result), logged)
+    if stated := stated_by(log):
+        problems += false_claims(stated, logged, "the page")
+        if _meant(str(stated.get("command"))) != _meant(command_in(rollout.record)):
+            problems.append("the page: command: differs from the log's")
+        if "seen" in stated:
+            from antdrive.sim.log.sights import seen_at  # imported here, because it loads kernels
+
+            if stated["seen"] != seen_at(rollout):
+                problems.append("the page: seen: differs from the log's scans")
     sentence = certificate.sentence
     if replay:
         from antdrive.sim.rerun import replayed

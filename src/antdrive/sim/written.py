@@ -182,7 +182,7 @@ class Written:
 
     def command(self) -> str | None:
         """Return the command that drives the scenario; None if the command line has no option for a setting."""
-        from antdrive.sim.forms import option_text, setting_words
+        from antdrive.sim.forms import option_text, setting_words, word_text
 
         settings = setting_words(self.settings)
         if settings is None:
@@ -191,7 +191,7 @@ class Written:
         world, before = (self.world, "") if isinstance(self.world, str) else _generating(dict(self.world))
         places = {"task": self.task, "start": self.start, "goal": self.goal}
         ends = [
-            f"--{key}={option_text(list(at) if key != 'task' else at)}" for key, at in places.items() if at is not None
+            f"--{key}={word_text(list(at) if key != 'task' else at)}" for key, at in places.items() if at is not None
         ]
         words = ["antdrive", "run", world, *ends, "--planner", self.planner, *options, "--robot", self.robot]
         return before + shlex.join([*words, *settings, "--seed", str(self.seed)])

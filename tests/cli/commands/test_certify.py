@@ -39,3 +39,12 @@ def test_a_touch_is_exit_code_1_and_json_says_why(antdrive, here):
 )
 def test_what_is_wrong_is_a_line_with_exit_code_2(refused, here, more, said):
     assert said in refused("certify", table(here / "log.csv"), *more)
+
+
+def test_its_page_proves_nothing_by_itself(antdrive, refused, here):
+    code, out, _ = antdrive("certify", table(here / "log.csv"), "--map", here / "hall.yaml", "--page", here / "p.html")
+    assert code == 0
+    assert f"page     {here / 'p.html'}" in out or "p.html" in out
+    assert "the page of another program's log; run antdrive certify on the log itself" in refused(
+        "verify", here / "p.html"
+    )

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from antdrive.proof import distances
 from antdrive.robots import footprint_clearance
 from antdrive.sim import Outcome, Rollout, certify
-from antdrive.sim.log.certificate import closed_form_clearance, in_metres
+from antdrive.sim.log.certificate import at_least, closed_form_clearance, in_metres
 from antdrive.sim.log.record import PerceptionRecord, ReplanRecord
 from antdrive.sim.policy import Trigger
 from antdrive.worlds import Cruising, Disc
@@ -176,3 +176,10 @@ def test_times_that_are_not_those_of_the_rows_are_named_and_nothing_else_fails(o
 def test_a_replan_long_after_the_drive_is_named():
     for trigger in ("waited", Trigger.DECISION):
         assert says(among_movers(PLAIN, replace(REPLAN, t=1e300, trigger=trigger)), "after the end")
+
+
+@given(st.floats(1e-9, 1e3))
+def test_a_proved_distance_is_never_written_larger(bound):
+    written = float(at_least(bound).removesuffix(" m"))
+    assert bound - 1.001e-4 < written <= bound * (1 + 1e-6) + 1e-10
+    assert written > 0

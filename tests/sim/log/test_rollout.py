@@ -94,6 +94,14 @@ def test_the_digest_covers_the_record_but_not_wall_clock_times(log):
     assert replace(log, record=wider).digest != log.digest
 
 
+@pytest.mark.parametrize(
+    ("key", "whole"), [("noise", 1), ("margin", 1), ("inflate", 1), ("cell", 1), ("time_limit", 99)]
+)
+def test_whole_numbers_give_the_digest_of_the_file(log, tmp_path, key, whole):
+    written = replace(log, record=replace(log.record, **{key: whole}))
+    assert Rollout.load(written.save(tmp_path / "run.npz")).digest == written.digest
+
+
 def test_what_could_not_be_read_again_is_not_written(log, tmp_path):
     task = log.record.task
     nameless = replace(log.record, task=changed(task, "world", name=""))

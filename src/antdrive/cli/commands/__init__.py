@@ -30,27 +30,28 @@ class Command(NamedTuple):
 ABOUT = """Plan paths, drive them in physics, certify the drives and film them.
 
 Exit codes: 0: success. 1: failed drive or plan, or an uncertified log.
-2: invalid input. 3: planner error or internal error. 129, 130, 143: interrupted.
-141: output pipe closed.
+2: invalid input. 3: planner error or internal error.
+129, 130, 143: interrupted. 141: output pipe closed.
 """
 DEBUG = "--debug"  # accepted anywhere, so it can be appended to a failed command
 
 #: Commands by name, in the order of `antdrive --help`.
 COMMANDS: Mapping[str, Command] = MappingProxyType(
     {
-        "demo": Command("Film ants beside A*: both plan, drive and are certified.", "drives"),
-        "init": Command("Write a suite, a robot, a world, a Python test and a GitHub workflow that pass."),
+        "demo": Command("Film ants and A* in one picture, planning and driving.", "drives"),
+        "init": Command("Write a suite, robot, world, Python test and CI workflow."),
         "run": Command("Plan a path, drive it in physics and certify the drive.", "plans drives"),
         "plan": Command("Plan a path without driving it.", "plans"),
-        "compare": Command("Compare planners, or controllers, on worlds or from campaign results.", "plans"),
+        "compare": Command("Compare planners or controllers, in worlds or from campaigns.", "plans"),
         "sweep": Command("Run a campaign: every combination of its settings.", "resumes plans"),
         "barn": Command("Drive the BARN Challenge worlds, or score a log.", "resumes plans"),
+        "view": Command("Write a drive's page, drive.html, and open it on a screen."),
         "render": Command("Render films of logged drives from any camera."),
         "report": Command("Write a report on many runs or on a campaign."),
         "export": Command("Export a drive to Foxglove, RViz or CSV."),
         "verify": Command("Re-certify drives from their logs alone."),
-        "certify": Command("Prove from another program's log how clear a robot was of a map and of other robots."),
-        "check": Command("Run suites or Python tests, and compare the drives with their baselines.", "plans"),
+        "certify": Command("Prove another program's log clear of a map and of other robots."),
+        "check": Command("Run suites or Python tests, and compare drives with baselines.", "plans"),
         "accept": Command(
             "Run suites or Python tests, and save the drives as baselines.", "plans", place="check.accept"
         ),
@@ -60,7 +61,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "shrink": Command("Reduce a failure to a minimal reproducer.", "resumes plans drives"),
         "reproduce": Command("Repeat a paper's experiments and test its claims.", "resumes plans"),
         "planners": Command("List the planners, or describe some with their options."),
-        "controller": Command("List the options of pure pursuit, or describe controllers with theirs."),
+        "controller": Command("List the options of pure pursuit, or describe controllers."),
         "schema": Command("Print the JSON Schema of a file type."),
         "warm": Command("Compile all planners ahead of time."),
     }

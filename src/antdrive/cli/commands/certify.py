@@ -11,6 +11,7 @@ from antdrive.base.tables import file_lines, marked
 from antdrive.cli import options
 from antdrive.cli.console import show
 from antdrive.cli.options import argument, option
+from antdrive.cli.output import film_drives
 
 if TYPE_CHECKING:
     from antdrive.sim.facts import Run
@@ -36,12 +37,13 @@ def certify(
     ] = 0.0,
     unknown: Annotated[str, option("KIND", "Unknown cells of the map are blocked or free.")] = "blocked",
     out: Annotated[Path | None, option("FOLDER", "Write certificate.json and a figure into a folder.")] = None,
+    page: Annotated[Path | None, option("FILE", "Write the page of the log: .html.")] = None,
     film: Annotated[Path | None, option("FILE", "Film the log: .mp4, .gif or .webp.")] = None,
     export: Annotated[Path | None, option("FILE", "Export it with obstacles and clearance to an .mcap file.")] = None,
     init: Annotated[Path | None, option("FILE", "Write all that was guessed as a suite, to be reviewed.")] = None,
     json: options.Json = False,
 ) -> bool:
-    """Prove from another program's log how clear a robot was of a map and of other robots.
+    """Prove another program's log clear of a map and of other robots.
 
     Between poses the robot keeps the limits of its file. The result is a foreign certificate: it names its assumptions, the
     largest pose error for which it holds, and gaps, jumps and corrections of the log.
@@ -64,18 +66,18 @@ def certify(
     facts += [("assumed", assumption) for assumption in found.assumptions]
     lines = [marked(found.certified, f"{log}: foreign certificate"), *_indented("", found.sentence)]
     lines += [line for key, value in facts for line in _indented(key, value)]
-    files = _written(foreign_run(found, setup), out, film, export) if out or film or export else {}
+    files = _written(foreign_run(found, setup), out, page, film, export) if out or page or film or export else {}
     if init is not None:
         files["suite"] = str(setup.write_suite(found, init))
     show(json, {**found.as_dict(), "files": files}, [*lines, *file_lines(files)])
     return found.certified
 
 
-def _written(run: "Run", out: Path | None, film: Path | None, export: Path | None) -> dict[str, str]:
-    """Write certificate and figure into a folder, a film and a bag; return the files by kind."""
+def _written(run: "Run", out: Path | None, page: Path | None, film: Path | None, export: Path | None) -> dict[str, str]:
+    """Write certificate and figure into a folder, a page, a film and a bag; return the files by kind."""
     from antdrive.views.export.exporting import export_foreign
     from antdrive.views.figures.run_figures import draw_run
-    from antdrive.views.run_folder import check_film, write_film
+    from antdrive.views.run_folder import check_film
 
     check_film(film, 0.0, ())
     assert run.rollout is not None
@@ -83,8 +85,12 @@ def _written(run: "Run", out: Path | None, film: Path | None, export: Path | Non
     if out is not None:
         files |= run.rollout.write_proof(out) | {"figure": str(out / "overview.png")}
         draw_run(run, files["figure"])
+    if page is not None:
+        from antdrive.views.viewer.drive_page import write_page
+
+        files["page"] = str(write_page([run], page))
     if film is not None:
-        files["film"] = str(write_film([run.rollout], film)["file"])
+        files["film"] = film_drives(run.rollout, film)["file"]
     return files if export is None else files | export_foreign(run.rollout, export)
 
 

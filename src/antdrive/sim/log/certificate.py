@@ -22,6 +22,7 @@ import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import format_numbers, wrap_angle
+from antdrive.base.tables import rounded_down
 from antdrive.base.types import Floats
 from antdrive.proof.distances import to_discs, to_outline, to_walls, to_world
 from antdrive.proof.track import Track, prove
@@ -87,20 +88,24 @@ class Certificate:
     @property
     def caption(self) -> str:
         """Line at the end of films."""
-        return f"certified: never closer than {self.bound:.3f} m" if self.certified else f"not {self.claim}"
+        return (
+            f"certified: never closer than {rounded_down(self.bound, 3):.3f} m"
+            if self.certified
+            else f"not {self.claim}"
+        )
 
     @property
     def sentence(self) -> str:
         """Statement with its distances."""
-        least, bound = in_metres(self.min_clearance), in_metres(self.bound)
-        return f"{self.statement}: minimum clearance {least}, between steps at least {bound}"
+        least, bound = in_metres(self.min_clearance), at_least(self.bound)
+        return f"{self.statement}: clearance {least}, between steps ≥ {bound}"
 
     def _repr_html_(self) -> str:
         from antdrive.worlds.svg import card
 
         facts: dict[str, object] = {
             "minimum clearance": in_metres(self.min_clearance),
-            "between steps at least": in_metres(self.bound),
+            "between steps at least": at_least(self.bound),
             "contact points": self.contacts,
             "moved at most": in_metres(self.moved),
         }
@@ -122,6 +127,14 @@ class Certificate:
 def in_metres(value: float) -> str:
     """Format a distance to a tenth of a millimetre; finer below that."""
     return f"{value:.4f} m" if abs(value) >= 5e-5 or value == 0 else f"{value:.1e} m"
+
+
+def at_least(bound: float) -> str:
+    """Format a proved distance as `in_metres` does, rounded down."""
+    if not 0 < bound < 1e-4:
+        return in_metres(rounded_down(bound, 4))
+    step = 10.0 ** (math.floor(math.log10(bound)) - 1)
+    return f"{math.floor(bound / step + 1e-6) * step:.1e} m"
 
 
 @functools.singledispatch

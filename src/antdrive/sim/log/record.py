@@ -330,6 +330,9 @@ class DriveRecord:
     digest: str | None = dataclasses.field(default=None, metadata=LOGGED)
 
     def __post_init__(self) -> None:
+        for key in ("noise", "margin", "inflate", "cell", "time_limit"):  # whole numbers have another text, and digest
+            if type(getattr(self, key)) is int:
+                object.__setattr__(self, key, float(getattr(self, key)))
         _at_least(self, 0, "seed", "noise", "margin", "inflate")
         for key in ("physics_hz", "control_hz"):
             if not 1 <= getattr(self, key) <= MAX_HZ:

@@ -20,15 +20,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, TypeAlias
+from typing import Any, BinaryIO, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.atomic import atomic_write
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.files import format_size, open_regular
+from antdrive.base.files import format_size, open_regular, read_bytes
 from antdrive.base.types import Floats
+from antdrive.sim.log import packing
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord, Evidence
 from antdrive.worlds.limits import MAX_LOG_DISTANCES, MAX_LOG_WALK, MAX_NEAR_DISTANCES
@@ -51,7 +52,7 @@ LONGEST_PROBLEM = 300  # characters of a message
 def guarded_log(path: str | Path) -> Iterator[Archive]:
     """Open the archive of a log; every error inside becomes one line that names the file."""
     try:
-        with open_regular(path, MAX_BYTES, "a rollout") as raw, zipfile.ZipFile(raw) as archive:
+        with _opened(path) as raw, zipfile.ZipFile(raw) as archive:
             _check_members(archive)
             yield archive
     except InputError as error:
@@ -69,6 +70,36 @@ def guarded_log(path: str | Path) -> Iterator[Archive]:
         # Foreign archives and headers fail in many ways: zlib and LZMA errors, unknown versions, syntax errors.
         lines = (getattr(error, "strerror", None) or str(error)).splitlines()
         raise _problem(path, f"not a rollout ({lines[0] if lines else type(error).__name__})") from None
+
+
+def _opened(path: str | Path) -> BinaryIO:
+    """Open a log, or the log in a page, for which the archive is packed again."""
+    page = packing.PAGE.search(str(path))
+    if page is None:
+        return open_regular(path, MAX_BYTES, "a rollout")
+    content = io.BytesIO()
+    arrays, record, _ = _in_page(path)
+    np.savez_compressed(content, record=np.array(record), **arrays)  # type: ignore[arg-type]
+    return content
+
+
+def _in_page(path: str | Path) -> tuple[dict[str, npt.NDArray[Any]], str, Any]:
+    """Return the arrays, the record's JSON text and what the page states, of the log in a page."""
+    file = str(path).removesuffix((packing.PAGE.search(str(path)) or [""])[1] or "")
+    packed = packing.packed_in(read_bytes(file, MAX_BYTES, "a page"), str(path))
+    try:
+        with np.errstate(all="ignore"):
+            return packing.unpack(packed, MAX_BYTES)
+    except (LookupError, TypeError, AttributeError, struct.error) as error:
+        raise ValueError("damaged: its packed log has other parts than antdrive's") from error
+
+
+def stated_by(path: str | Path) -> Mapping[str, Any]:
+    """Return what a page states about the drive whose log it holds; empty for a log beside no page."""
+    if packing.PAGE.search(str(path)) is None:
+        return {}
+    stated = _in_page(path)[2]
+    return stated if isinstance(stated, dict) else {}
 
 
 def read_array(archive: Archive, name: str) -> npt.NDArray[Any]:
@@ -276,7 +307,7 @@ class Rollout:
         For each array, in the order of this class, the hash takes the line "name dtype shape" and the bytes in C order;
         then the record's JSON text, without `UNHASHED`.
         """
-        return self._hash(self.record.to_json(without=UNHASHED))
+        return self._hash(self.record.to_json(without=packing.UNHASHED))
 
     @property
     def drive_digest(self) -> str:
@@ -339,13 +370,21 @@ class Rollout:
             np.savez_compressed(file, record=np.array(text), **arrays)
         return target
 
+    def packed(self, stated: Mapping[str, Any]) -> str:
+        """Return the log in base 85 for a page, which `stated` describes."""
+        record = dataclasses.replace(self.record, digest=self.digest).as_dict()
+        unhashed = {key: record[key] for key in packing.UNHASHED if key in record}
+        arrays = {name: getattr(self, name) for name in self._written}
+        text, period = self.record.to_json(without=packing.UNHASHED), self.record.rows_per_period
+        return packing.pack(arrays, text, unhashed, stated, period)
+
     def write_proof(self, folder: Path) -> dict[str, str]:
         """Write the log into a test's folder; return the file by kind."""
         return {"rollout": str(self.save(folder / "rollout.npz"))}
 
     @classmethod
     def load(cls, path: str | Path) -> Rollout:
-        """Read a log.
+        """Read a log from its file or from a page; `drive.html#2` is the second log of a page.
 
         Raises:
             InputError: the file is missing or not a rollout, a later version wrote it, or an array or a key of the record is
@@ -466,7 +505,6 @@ class Rollout:
 #: Names of the arrays that only lidar logs hold, in the order of the digest, after the others.
 SENSED = ("scans", "scan_rows", "seen", "tracks")
 #: Keys of the record that digests do not cover.
-UNHASHED = ("digest", "times", "written")
 #: Names of the arrays of every log, in the order of the digest.
 ARRAYS = tuple(name for name in FORMS if name not in SENSED)
 

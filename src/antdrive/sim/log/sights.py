@@ -104,6 +104,12 @@ def first_meetings(rollout: Rollout) -> Floats:
     return met
 
 
+def seen_at(rollout: Rollout) -> list[float | None]:
+    """Return the first hit of each cylinder, then of each mover [s]; None where there is none."""
+    movers = [sight.seen_at for sight in mover_sightings(rollout)] if rollout.record.world.movers else []
+    return [finite_or_none(at) for at in [*first_meetings(rollout).tolist(), *movers]]
+
+
 def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
     """Return the sightings of all cylinders, nearest first."""
     touched = set(rollout.contacts[:, 1].astype(int).tolist())
