@@ -152,9 +152,10 @@ def stages(folder: Path) -> None:
     log = stage("read the log", lambda: Rollout.load(folder / "rollout.npz"))
     print(f"  {stage('certify it', lambda: certify(log)).sentence}")
     stage("overview figure", lambda: overview(log, folder / "overview.png"))
-    film(log, folder / "film.mp4", size=(320, 240), speed=60.0)
+    film(log, folder / "film.mp4", camera="oblique", size=(320, 240), speed=60.0)
     made: Any = stage(
-        "film at 60 times the speed, 640 x 480", lambda: film(log, folder / "film.mp4", size=(640, 480), speed=60.0)
+        "film at 60 times the speed, 640 x 480",
+        lambda: film(log, folder / "film.mp4", camera="oblique", size=(640, 480), speed=60.0),
     )
     print(f"  {made.frames} frames")
 

@@ -1,7 +1,6 @@
 """Mapless drives: `python -m benchmarks.unknown ablations|contacts|fixes --results FOLDER [--worlds N] [--jobs N]`.
 
-Prints Markdown. Repeat the command to resume from the results in the folder. `--films` films failed drives into the folder
-`films` of their results.
+Prints Markdown. Repeat the command to resume from the results in the folder.
 
 - ablations: BARN's worlds, `jackal`, noise and `--localisation matching`; range, beams or field of view of the lidar, odometry
   errors, or planner differ from the first row. *Price*: ratio of arrival times, and of lengths, to the same drives with the
@@ -32,12 +31,10 @@ from antdrive.base.atomic import atomic_write
 from antdrive.robots import list_robots
 from antdrive.runs.barn_challenge import by_world, campaign_data, reference_times, unpacked
 from antdrive.runs.campaigns import sweep
-from antdrive.runs.campaigns.results import SweepResults
 from antdrive.runs.statistics.intervals import means_by_world
 from antdrive.runs.statistics.price import Ratio, prices
 from antdrive.runs.statistics.run_table import RunTable
 from antdrive.runs.statistics.significance import mcnemar
-from antdrive.views.film.video import film_failures
 from antdrive.worlds import generate
 from benchmarks.drives import Result, drive
 from benchmarks.markdown import call_all, command_line, missing, print_tables, table
@@ -107,7 +104,7 @@ def ablations(given: argparse.Namespace) -> Iterator[str]:
         data = campaign_data(worlds, given.trials, planner, robot, settings)
         chosen = data["worlds"][:: max(1, len(data["worlds"]) // (given.worlds or len(data["worlds"])))]
         data["worlds"] = chosen[: given.worlds or None]
-        return filmed(sweep(data, given.results / name, jobs=given.jobs, keep="failed"), given.films).table
+        return sweep(data, given.results / name, jobs=given.jobs, keep="failed").table
 
     def rows() -> Iterator[list[str]]:
         known: dict[str, Any] = {}
@@ -122,13 +119,6 @@ def ablations(given: argparse.Namespace) -> Iterator[str]:
             yield row(variant.name, runs, fastest, known[variant.planner])
 
     yield from table(HEADS, rows())
-
-
-def filmed(results: SweepResults, films: bool) -> SweepResults:
-    """Return the results, after filming failures if requested."""
-    if films:
-        film_failures(results.table.to_pylist(), results.folder, results.folder / "films")
-    return results
 
 
 def row(name: str, runs: Any, fastest: Mapping[str, float], known: Any) -> list[str]:
@@ -168,7 +158,7 @@ def contacts(given: argparse.Namespace) -> Iterator[str]:
         "margin": [0.03],
         "settings": {"map": "none", "localisation": "matching"},
     }
-    runs = filmed(sweep(data, given.results, jobs=given.jobs, keep="failed"), given.films).table.to_pylist()
+    runs = sweep(data, given.results, jobs=given.jobs, keep="failed").table.to_pylist()
     yield from table(("robot", "worlds", "drives", "certified", "contacts while driving", "ends"), counted(runs))
     for run in runs:
         if not run["succeeded"]:
@@ -271,7 +261,6 @@ def main() -> None:
         variants=(len(VARIANTS), "how many rows of the ablations"),
         trials=(1, "how often each of BARN's worlds is driven"),
         jobs=(1, "processes; 0: this one"),
-        films=(False, "film each drive that did not arrive"),
     )
     print_tables(given.tables, {"ablations": ablations, "contacts": contacts, "fixes": fixes}, given)
 

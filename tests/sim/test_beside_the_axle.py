@@ -94,9 +94,8 @@ def test_a_robot_is_drawn_within_its_footprint(name):
     robot = load_robot(name if name in list_robots() else "warehouse")
     robot = replace(robot, footprint=feet.get(name, robot.footprint))
     for part in robot_parts(robot):
-        if not part.wheel:
-            deepest = min(robot.footprint.depth(x, y) for x, y in part.mesh.vertices[:, :2].tolist())
-            assert deepest >= -1e-9, part.colour
+        deepest = min(robot.footprint.depth(x, y) for x, y in part.mesh.vertices[:, :2].tolist())
+        assert deepest >= -1e-9, part.colour
 
 
 URDF = Path(__file__).parents[1] / "robots" / "importing" / "urdf"

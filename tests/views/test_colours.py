@@ -3,19 +3,38 @@
 import numpy as np
 import pytest
 
-from antdrive.views.colour_vision import VISIONS, differences
+from antdrive.views import colours
+from antdrive.views.colour_vision import VISIONS, differences, luminance
 from antdrive.views.colours import LEAST_DIFFERENCE, OWN_COLOURS, PLANNER_COLOURS, PLANNER_STYLES, label_styles
 
 
-def nearest(colours):
+def nearest(several):
     """Return the least difference of any two colours."""
-    apart = differences(colours, colours)
+    apart = differences(several, several)
     return apart[~np.eye(len(apart), dtype=bool)].min()
 
 
 def test_any_two_planners_are_told_apart_with_any_colour_vision():
     assert len(VISIONS) == 4
     assert nearest([*PLANNER_COLOURS, *OWN_COLOURS]) >= LEAST_DIFFERENCE
+
+
+def contrast(colour, ground):
+    """Return the contrast ratio of WCAG 2."""
+    darker, lighter = sorted((luminance(colour), luminance(ground)))
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+def test_robot_and_movers_stand_out_from_the_map_with_any_colour_vision():
+    marked = [colours.SHELL, colours.MOVER]
+    others = [
+        getattr(colours, name)
+        for name in ["GROUND", "OBSTACLE", "UNSEEN", "START", "GOAL", "CONTACT", "TRACKED", "BEAM"]
+    ]
+    assert min(contrast(colour, colours.GROUND) for colour in marked) >= 3
+    assert differences(marked, others).min() >= LEAST_DIFFERENCE
+    assert nearest(marked) >= LEAST_DIFFERENCE
+    assert min(contrast(colour, colours.WHITE) for _, colour in colours.OUTCOME_LABELS.values()) >= 4.5
 
 
 def test_differences_are_those_of_cielab_with_the_worst_vision():

@@ -26,7 +26,7 @@ def ignore(name: str) -> None:
 
 
 #: What a command prints when its first kernel compiles.
-COMPILING = "compiling planner, drive and film, once per installation: up to 1 min"
+COMPILING = "compiling planner and drive, once per installation: up to 1 min"
 on_compile: Callable[[str], None] = ignore  # called with each kernel's name before it compiles
 blocks = 0  # open blocks of `compiled`
 interpreted = 0  # calls of kernels that Python ran in this process

@@ -7,17 +7,20 @@ import dataclasses
 import functools
 import inspect
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from antdrive.base import guarded
 from antdrive.base.errors import FieldError, InputError
-from antdrive.cli.parse import disc
+from antdrive.cli import parse
 from antdrive.sim.settings import SETTINGS, DeclaredSetting
+
+if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
 
 Command = Callable[..., Any]
 NONE: Mapping[str, str] = MappingProxyType({})
@@ -139,7 +142,7 @@ def _parameter(
 def _value(one: DeclaredSetting, value: Any, many: bool) -> Any:
     """Convert an option's value to a setting's value as in files."""
     if one.setting.form == "discs":
-        return [disc(text) for text in value or ()]
+        return [parse.disc(text) for text in value or ()]
     values = value if many else [value]
     if one.setting.form == "margin":
         values = [None if text is None else _margin(text) for text in values or ()]
@@ -168,19 +171,11 @@ LogPlanner = Annotated[
 ]
 LogController = Annotated[str | None, option("FILE.py:CLASS", "Class of the log's controller, if not registered.")]
 Out = Annotated[Path | None, option("FOLDER", "Output folder.  [default: a folder in out/]", panel="Output")]
-Prelude = Annotated[
-    float,
-    option(
-        "SECONDS",
-        "Planning shown at the start of the film [s]; needs an iterative planner.",
-        panel="Output",
-        min=0.0,
-        max=60.0,
-    ),
+Figures = Annotated[
+    str | None, option("FORMATS", "Figures for papers: png, pdf, svg, or several with commas.", panel="Output")
 ]
-Speed = Annotated[float, option("FACTOR", "Playback speed of the film.", panel="Output", min=0.01, max=100)]
-Vector = Annotated[bool, flag("Also write figures as PDF.", "--vector", panel="Output")]
-Figures = Annotated[bool, flag("Write figures.", "--figures/--no-figures", panel="Output")]
+NoFigures = Annotated[bool, flag("Write no figures.", "--no-figures", panel="Output")]
+NoView = Annotated[bool, flag("Do not write the page drive.html.", "--no-view", panel="Output")]
 Jobs = Annotated[int | None, option("NUMBER", "Processes.  [default: one per core]", min=1, max=256)]
 XacroArguments = Annotated[list[str] | None, option("NAME=VALUE", "Argument of a .xacro file. Repeatable.", "--arg")]
 RosPackages = Annotated[
@@ -192,3 +187,38 @@ RosPackages = Annotated[
     ),
 ]
 Json = Annotated[bool, flag("Print a single JSON object on stdout.", "--json", panel="Output")]
+
+
+@dataclasses.dataclass(frozen=True)
+class Filming:
+    """Options of a film."""
+
+    prelude: Annotated[
+        float,
+        option("SECONDS", "Planning shown first [s]; needs an iterative planner.", panel="Output", min=0.0, max=60.0),
+    ] = 0.0
+    camera: Annotated[
+        str | None,
+        option("NAME", "View: oblique, top or follow.  [default: follow; oblique for several drives]", panel="Output"),
+    ] = None
+    size: Annotated[
+        str | None, option("WIDTHxHEIGHT", "Picture size [px].", panel="Output", show_default="1280x720")
+    ] = None
+    speed: Annotated[float, option("FACTOR", "Playback speed.", panel="Output", min=0.01, max=100)] = 1.0
+
+    def shape(self) -> dict[str, Any]:
+        """Return camera and size, if given, as `film` takes them."""
+        shape: dict[str, Any] = {} if self.size is None else {"size": parse.size(self.size)}
+        return shape if self.camera is None else {**shape, "camera": self.camera}
+
+    def checked(self, path: Path | None, scenarios: "Sequence[Scenario]", *, several: bool = False) -> dict[str, Any]:
+        """Return the options as `film` takes them; raise `InputError` if they cannot hold for `--film PATH`."""
+        from antdrive.views.film.film_options import FilmOptions
+        from antdrive.views.run_folder import check_film
+
+        for one in dataclasses.fields(self):
+            if path is None and getattr(self, one.name) != one.default:
+                raise InputError(f"--{one.name}: needs --film")
+        FilmOptions(**self.shape()).checked(several=several)
+        check_film(path, self.prelude, scenarios)
+        return {**self.shape(), "speed": self.speed, "prelude": self.prelude}

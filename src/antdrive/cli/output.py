@@ -36,12 +36,13 @@ def results_folder(
         yield folder, facts
 
 
-def film_drives(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
-    """Film one drive, or several side by side, with a progress bar. Return facts about the film."""
-    from antdrive.views.run_folder import write_film
+def film_drives(logs: Rollout | Mapping[str, Rollout], path: Path, **options: Any) -> dict[str, Any]:
+    """Film one drive, or several by name in one picture, with a progress bar. Return facts about the film."""
+    from antdrive.views.film.video import film
 
     with bar("filming") as progress:
-        return write_film(logs, path, progress=progress, **options)
+        info = film(logs, path, progress=progress, **options)
+    return {"file": str(info.path), "frames": info.frames, "size": list(info.size), "fps": info.fps}
 
 
 def print_idle_settings(scenarios: Sequence[Scenario], given: Collection[str] = ()) -> None:

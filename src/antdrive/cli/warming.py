@@ -9,7 +9,6 @@ import hashlib
 import importlib.util
 import os
 import platform
-import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,8 +19,6 @@ from antdrive.base.errors import InputError
 from antdrive.base.version import has_physics, versions
 
 if TYPE_CHECKING:
-    from antdrive.sim.log.rollout import Rollout
-    from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
 
 
@@ -31,7 +28,7 @@ def is_warm() -> bool:
 
 
 def warm(jobs: int | None = None, progress: Callable[[float], None] | None = None) -> None:
-    """Compile every kernel into the cache: plan with every planner, drive and film, and drive a batch of `antdrive.gym`.
+    """Compile every kernel into the cache: plan with every planner, drive, and drive a batch of `antdrive.gym`.
 
     Drives need PyBullet, a batch gymnasium.
 
@@ -46,7 +43,7 @@ def warm(jobs: int | None = None, progress: Callable[[float], None] | None = Non
     from antdrive.runs.pool import Pool, cores
 
     marker = _marker()
-    works: list[Any] = [drive_and_film] if has_physics() else []
+    works: list[Any] = [drive] if has_physics() else []
     works += [*([drive_batch] if _has_gymnasium() else []), *PLANNERS]
     with Pool(jobs or cores()) as pool:
         for done, _ in enumerate(pool.results(_compile, works, in_order=False), 1):
@@ -74,11 +71,10 @@ def plan_with(name: str) -> None:
         plan(_oblong(replace(one, task=task)))
 
 
-def drive_and_film() -> None:
-    """Drive in a tiny world, with and without a map, and film the drives."""
+def drive() -> None:
+    """Drive in a tiny world, with and without a map."""
     from antdrive.robots import CONTROLLERS
     from antdrive.sim.pipeline import run
-    from antdrive.views.film.video import film
     from antdrive.worlds import Cruising
 
     task = _scenario().task
@@ -88,12 +84,7 @@ def drive_and_film() -> None:
     run(replace(_scenario(), map="none", localisation="matching"))
     for controller in CONTROLLERS.values():
         run(replace(_scenario(), controller=controller))
-    log, ants = _log(run(_scenario())), _log(run(_scenario("as")))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "warm.mp4"
-        film(log, path, size=(160, 160), fps=2)
-        film(log, path, size=(160, 160), fps=2, camera="follow")
-        film(ants, path, size=(160, 160), fps=2, prelude=1.0)
+    run(_scenario())
 
 
 def drive_batch() -> None:
@@ -107,11 +98,6 @@ def drive_batch() -> None:
 
 def _has_gymnasium() -> bool:
     return importlib.util.find_spec("gymnasium") is not None
-
-
-def _log(run: Run) -> Rollout:
-    assert run.rollout is not None
-    return run.rollout
 
 
 def _scenario(planner: str = "astar") -> Scenario:

@@ -279,7 +279,7 @@ def painter_of(task: Task, robot: RobotSpec) -> Any:
 
     scene = Scene.running(task, robot)
     camera = camera_for("oblique", scene.bounds[:2], scene.bounds[2:], drawn_height(scene), PICTURE)
-    return Compositor(scene, camera, route=np.empty((0, 2)))
+    return Compositor(scene, camera)
 
 
 def _masked(values: Mapping[str, Any], mask: Flags) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from antdrive.foreign.playback import ForeignRollout
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.colour_vision import differences, luminance
+from antdrive.worlds.grid import Grid
 
 Colour: TypeAlias = tuple[int, int, int]  # red, green, blue, 0 to 255
 Label: TypeAlias = tuple[str, Colour]
@@ -26,12 +27,13 @@ GRID: Colour = (203, 210, 220)
 KERB: Colour = (196, 203, 213)
 OBSTACLE: Colour = (121, 136, 160)
 UNSEEN: Colour = (196, 74, 138)  # obstacles placed after planning
-MOVER: Colour = (224, 168, 40)
+MOVER: Colour = (130, 50, 230)
 ZONE: Colour = (96, 128, 186)  # no-go area for the robot's centre
 ROUTE: Colour = (24, 34, 66)
-SHELL: Colour = (255, 122, 14)  # the robot's deck
-TURRET: Colour = (226, 84, 0)  # the robot's upper part
+SHELL: Colour = (224, 96, 0)  # the robot's deck
+TURRET: Colour = (184, 66, 0)  # the robot's upper part
 WHITE: Colour = (255, 255, 255)
+CRUISE: Colour = (92, 138, 150)  # path driven at top speed
 START: Colour = (52, 92, 190)
 GOAL: Colour = (0, 138, 92)
 CONTACT: Colour = (214, 34, 44)
@@ -51,7 +53,7 @@ BAND: Colour = (255, 255, 255)
 # Meaning of labels.
 GOOD: Colour = (0, 128, 84)
 BAD: Colour = (204, 32, 42)
-DOUBT: Colour = (176, 106, 0)
+DOUBT: Colour = (158, 94, 0)
 CALM: Colour = (70, 82, 104)
 
 #: Label and colour of each outcome.
@@ -78,14 +80,8 @@ def label_of(log: Rollout) -> Label:
     return ("✓ PROVED CLEAR", GOOD) if log.certificate.certified else ("✕ NOT PROVED CLEAR", BAD)
 
 
-#: Colours from standstill to the robot's top speed: viridis without its palest end, which is invisible on light ground.
-SPEED_STOPS: tuple[Colour, ...] = (
-    *((72, 26, 108), (68, 58, 131), (57, 86, 140), (44, 113, 142), (33, 138, 141)),
-    *((32, 163, 134), (64, 185, 112), (116, 206, 75), (168, 218, 50)),
-)
-
-
 #: Colours of a planner's field, such as pheromone, from its low to its high values.
+ROUNDING = 1e-6  # smallest relative range of a field's values; less is rounding
 FIELD_STOPS: tuple[Colour, ...] = ((244, 246, 249), (213, 228, 243), (143, 188, 224), (63, 131, 191), (18, 63, 122))
 
 #: One colour per planner of the catalogue. The first seven are Okabe and Ito's without yellow, which is invisible on white.
@@ -99,6 +95,11 @@ PLANNER_COLOURS: tuple[Colour, ...] = (
 OWN_COLOURS: tuple[Colour, ...] = (
     *((108, 60, 192), (132, 192, 132), (156, 24, 144), (96, 0, 96)),
     *((132, 156, 252), (60, 60, 48), (168, 180, 168), (36, 72, 84)),
+)
+#: One colour per speed-limiting rule; most are from the colour-blind-safe palette of Okabe and Ito.
+LIMITER_COLOURS = (
+    *("#c9ced6", "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#cc79a7"),
+    *("#d55e00", "#5b6576", "#f0e442", "#7a4b9e", "#1b2333", "#a3d9c9"),
 )
 LEAST_DIFFERENCE = 14.0  # of any two of these colours, for any colour vision (CIE76)
 
@@ -115,21 +116,19 @@ PLANNER_STYLES: Mapping[str, tuple[Colour, str]] = MappingProxyType(
 )
 
 
+def shown_field(grid: Grid, field: Floats) -> tuple[Floats, float, float] | None:
+    """Return a planner's field (R, C) with nan off free cells, and the values at both ends of its colours; None if constant."""
+    values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
+    finite = values[np.isfinite(values)]
+    low, high = np.quantile(finite, (0.02, 0.995)).tolist() if len(finite) else (0.0, 0.0)
+    return None if high - low <= ROUNDING * max(abs(low), abs(high)) else (values, low, high)
+
+
 def field_colours(level: npt.ArrayLike) -> Floats:
     """Return colours (N, 3), 0 to 255, for levels (N,), 0 to 1, of a planner's field."""
-    return _along(FIELD_STOPS, level)
-
-
-def speed_colours(fraction: npt.ArrayLike) -> Floats:
-    """Return colours (N, 3), 0 to 255, for speeds as fractions (N,) of the robot's top speed."""
-    return _along(SPEED_STOPS, fraction)
-
-
-def _along(colours: tuple[Colour, ...], fraction: npt.ArrayLike) -> Floats:
-    stops = np.array(colours, dtype=np.float64)
-    at = np.clip(np.asarray(fraction, dtype=np.float64).reshape(-1), 0.0, 1.0)
-    knots = np.linspace(0.0, 1.0, len(stops))
-    return np.stack([np.interp(at, knots, stops[:, channel]) for channel in range(3)], axis=1)
+    knots = np.linspace(0.0, 1.0, len(FIELD_STOPS))
+    at = np.asarray(level, dtype=np.float64).reshape(-1)
+    return np.stack([np.interp(at, knots, channel) for channel in zip(*FIELD_STOPS, strict=True)], axis=1)
 
 
 def hexed(colour: Colour) -> str:
@@ -204,6 +203,10 @@ def _on_dark(colours: Sequence[Colour]) -> list[str]:
 
 def _shifted(colour: Colour, by: float) -> Colour:
     """Mix a colour with black (-1) or white (1)."""
-    target = 255 if by > 0 else 0
-    red, green, blue = (round(c + abs(by) * (target - c)) for c in colour)
+    return mixed(colour, WHITE if by > 0 else (0, 0, 0), abs(by))
+
+
+def mixed(colour: Colour, other: Colour, share: float) -> Colour:
+    """Mix a colour with a `share` of another."""
+    red, green, blue = (round(c + share * (o - c)) for c, o in zip(colour, other, strict=True))
     return red, green, blue

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base.plane import relative_frame
 from antdrive.base.types import Flags, Floats, Pose
@@ -43,11 +42,6 @@ class MapReconstruction:
         self.map = self._empty_map(rollout.record.task.start)
         ticks = reset_ticks(rollout.record) if resets else ()
         self._reset_times = [tick / rollout.record.control_hz for tick in ticks]
-
-    @property
-    def explored(self) -> float:
-        """Known area of the map, free or hit [m²]."""
-        return float(np.count_nonzero(self.seen)) * self.map.cell**2
 
     @property
     def seen(self) -> Flags:
@@ -124,11 +118,12 @@ def world_points(points: Floats, drift: Floats) -> Floats:
     return np.asarray((points - (x, y)) @ np.array([[cos, -sin], [sin, cos]]), dtype=np.float64)
 
 
-def enclosing_cylinders(cylinders: Floats) -> npt.NDArray[np.intp]:
-    """Return for each of the cylinders (N, 4) the index of one that encloses and hides it, or its own index."""
-    enclosing = np.arange(len(cylinders))
-    for j, (x, y, radius, _) in enumerate(cylinders):
-        room = cylinders[:, 2] - radius - np.hypot(cylinders[:, 0] - x, cylinders[:, 1] - y)
-        room[j] = 0.0
-        enclosing[j] = room.argmax()
-    return enclosing
+def enclosed(cylinders: Floats) -> Flags:
+    """Return which of the cylinders (N, 4) lie within another (N,); of equal ones, all but the first."""
+    order = np.argsort(-cylinders[:, 2], kind="stable")
+    x, y, radius = cylinders[order, :3].T
+    inside = np.zeros(len(order), dtype=np.bool_)
+    for k, number in enumerate(order):
+        apart = (x[:k] - x[k]) ** 2 + (y[:k] - y[k]) ** 2
+        inside[number] = (apart <= (radius[:k] - radius[k]) ** 2).any()
+    return inside

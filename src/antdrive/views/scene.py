@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from antdrive.worlds import Grid
 
 MIN_JUMP = 0.05  # minimum distance between two rows that counts as a jump of a mover [m]
+RIM, NEAREST = 97, 12  # points on a footprint, and discs, among which the nearest two points are found
 PLANNED_TRACK = 30.0  # duration of the movers' tracks in a plan's figure [s]
 
 
@@ -41,9 +42,8 @@ class Scene:
     mapped: bool = True  # whether the robot had a map
     outlined: bool = False  # whether the plan keeps the footprint clear, and not the disc around it
     mover_radii: tuple[float, ...] = ()  # one per mover [m]
-    movers: tuple[
-        Point, ...
-    ] = ()  # one position per mover [m]: at the run's end, or at t = 0 for a plan without a drive
+    # one position per mover [m]: at the first contact or closest approach, or at t = 0 for a plan without a drive
+    movers: tuple[Point, ...] = ()
     movers_at: float = 0.0  # time of these positions [s]
     tracks: tuple[Floats, ...] = ()  # the movers' polylines (N, 2) [m]; a mover that jumps has several
 
@@ -51,6 +51,7 @@ class Scene:
     def of(cls, rollout: Rollout) -> Scene:
         """Return the scene of a logged run."""
         record, world = rollout.record, rollout.record.world
+        row = decisive_row(rollout)
         return cls._in(
             world,
             record.task,
@@ -61,8 +62,8 @@ class Scene:
             outlined=record.footprint_margin is not None,
             mapped=not record.mapless,
             mover_radii=tuple(mover.radius for mover in world.movers),
-            movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
-            movers_at=float(rollout.t[-1]) if len(rollout.t) else 0.0,
+            movers=tuple((x, y) for x, y in rollout.movers[row].tolist()) if len(rollout.movers) else (),
+            movers_at=float(rollout.t[row]) if len(rollout.t) else 0.0,
             tracks=mover_tracks(rollout.movers),
         )
 
@@ -107,16 +108,6 @@ class Scene:
         return "placed after planning" if self.mapped else "not in the world file"
 
     @property
-    def route_label(self) -> str:
-        """Legend of the initial route."""
-        return "route" if self.mapped else "initial route"
-
-    @property
-    def movers_label(self) -> str:
-        """Legend of the movers, with the time of the shown positions."""
-        return f"mover at {self.movers_at:.1f} s"
-
-    @property
     def no_go_label(self) -> str:
         """Legend of the no-go area."""
         if self.outlined:
@@ -136,10 +127,10 @@ class Scene:
         low_x, low_y, high_x, high_y = self.bounds
         return min(low_x, x0), min(low_y, y0), max(high_x, x1), max(high_y, y1)
 
-    def region(self, points: Floats) -> tuple[Floats, Floats]:
+    def region(self, points: Floats, *, whole: bool = False) -> tuple[Floats, Floats]:
         """Return the corners (2,), (2,) [m] of the region around start, goal and points (N, 2) [m].
 
-        A region larger than half of the world is extended to the whole world.
+        A region larger than half of the world is extended to the whole world, and with `whole` every region.
         """
         room = max(0.8, 3 * self.robot.footprint.radius, 1.5 * self.inflate)
         ends = np.array([self.start[:2], self.goal])
@@ -147,9 +138,16 @@ class Scene:
         world_low, world_high = np.array(self.bounds[:2]), np.array(self.bounds[2:])
         low = np.maximum(points.min(axis=0) - room, world_low)
         high = np.minimum(points.max(axis=0) + room, world_high)
-        if np.prod(high - low) > 0.5 * np.prod(world_high - world_low):
+        if whole or np.prod(high - low) > 0.5 * np.prod(world_high - world_low):
             return world_low, world_high
         return low, high
+
+
+def decisive_row(rollout: Rollout) -> int:
+    """Return the row of the first contact, else of the closest approach; 0 without rows."""
+    if not len(rollout.t):
+        return 0
+    return min(rollout.first_contact, len(rollout.t) - 1) if len(rollout.contacts) else int(rollout.clearance.argmin())
 
 
 def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats) -> tuple[float, float]:
@@ -168,6 +166,24 @@ def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats)
     if gap < 1e-9:
         return ox, oy
     return ox + radius * (nx - ox) / gap, oy + radius * (ny - oy) / gap
+
+
+def nearest_points(scene: Scene, pose: Pose, movers: Floats) -> tuple[Point, Point]:
+    """Return the nearest two points of the footprint and of an obstacle, mover or wall [m], to about a millimetre."""
+    x, y, yaw = pose
+    corners = np.array([*scene.robot.footprint.outline(), scene.robot.footprint.outline()[0]]) @ (1, 1j)
+    arc = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(corners)))])
+    rim = complex(x, y) + np.interp(np.linspace(0, arc[-1], RIM), arc, corners) * np.exp(1j * yaw)
+    discs = np.vstack([scene.obstacles[:, :3], np.column_stack([movers, scene.mover_radii])])
+    discs = discs[np.argsort(np.hypot(discs[:, 0] - x, discs[:, 1] - y) - discs[:, 2])[:NEAREST]]
+    ways = discs[:, :2] @ (1, 1j) - rim[:, None]
+    lengths = np.abs(ways)
+    x0, y0, x1, y1 = scene.bounds
+    walls = np.column_stack([x0 - rim.real, x1 - rim.real, 1j * (y0 - rim.imag), 1j * (y1 - rim.imag)])
+    ways = np.hstack([ways * (1 - discs[:, 2] / np.maximum(lengths, 1e-9)), walls])
+    at, _ = best = np.unravel_index(np.abs(ways).argmin(), ways.shape)
+    one, other = complex(rim[at]), complex(rim[at] + ways[best])
+    return (one.real, one.imag), (other.real, other.imag)
 
 
 def jumps(movers: Floats) -> Flags:

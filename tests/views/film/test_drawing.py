@@ -1,21 +1,17 @@
-"""Cameras and meshes against closed forms and PyBullet's TinyRenderer."""
-
-import math
+"""Cameras, shapes on the ground and bodies against closed forms."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.robots import load_robot
-from antdrive.sim.physics.bullet import bullet, client
-from antdrive.views.colours import MOVER
+from antdrive.views.colours import BAD, GOOD, HIT, MOVER, WHITE
 from antdrive.views.film.camera import CAMERAS, camera_for
-from antdrive.views.film.compositor import part_pose
-from antdrive.views.film.meshes import Mesh, cylinder, robot_parts
-from antdrive.views.film.solids import AMBIENT, DIFFUSE, Solid, draw_solids, merged, overlap, placed
+from antdrive.views.film.compositor import _post as post
+from antdrive.views.film.ground import band, discs, rectangle
+from antdrive.views.film.meshes import Mesh, Part, cylinder
+from antdrive.views.film.painter import Painter
 from antdrive.views.scene import Scene
-from antdrive.views.window import add_mesh
 from tests.views.film.test_compositor import camera
 
 SIZE = (320, 240)
@@ -57,128 +53,125 @@ def test_a_moved_camera_keeps_its_scale(scene):
     assert np.abs(at).max() < 1e-9
 
 
-def test_bodies_behind_the_camera_are_omitted(scene):
+def drawn(bodies, view):
+    """Return the picture (H, W, 3) of bodies on black."""
+    painter = Painter(view, 0.6)
+    painter.pixels[:] = 0, 0, 0, 255
+    painter.draw_bodies(bodies)
+    return painter.pixels[..., :3].astype(int)
+
+
+def test_a_disc_on_the_ground_is_where_the_camera_projects_it(scene):
     view = camera(scene)
-    eye = -view.view[:3, :3].T @ view.view[:3, 3]
-    centres = np.array([(2.0, 1.5, 0.0), eye, (2.0, -40.0, 0.0), (60.0, 1.5, 0.0)])
-    assert view.sees(centres, np.full(4, 0.3)).tolist() == [True, False, False, False]
-    everything = np.array([(x, y, 0.0) for x in (0, 4) for y in (0, 3)])
-    assert view.sees(everything, np.full(4, 0.1)).all()
+    painter = Painter(view, 0.3)
+    painter.pixels[:] = 0, 0, 0, 255
+    painter.fill(discs(np.array([(1.5, 1.2)]), 0.4), WHITE)
+    rows, cols = np.mgrid[: SIZE[1], : SIZE[0]] + 0.5
+    back = np.stack([cols, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(view.ground).T
+    away = np.hypot(back[..., 0] / back[..., 2] - 1.5, back[..., 1] / back[..., 2] - 1.2)
+    inside = painter.pixels[..., 0] > 127
+    assert (inside == (away < 0.4))[np.abs(away - 0.4) > view.pixel].all()
+    assert inside.sum() > 1000
 
 
-SUN = (-0.62, -0.25, 0.74)
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+def test_a_path_without_points_is_not_drawn(scene):
+    painter = Painter(camera(scene), 0.3)
+    before = painter.pixels.copy()
+    for line in (np.empty((0, 2)), np.array([(1.0, 1.0)])):
+        painter.fill(band(line, 0.1), WHITE)
+    assert (painter.pixels == before).all()
 
 
-def rendered(bodies, camera, box, fine):
-    """Render with PyBullet's TinyRenderer: picture (h, w, 3), depth (h, w) and body indices (h, w), -1 for none."""
-    p, (x0, y0, x1, y1), (wide, high) = bullet(), box, camera.size
-    across, down = (x0 + x1) / wide - 1, 1 - (y0 + y1) / high
-    projection = camera.projection.copy()
-    projection[0] = wide / (x1 - x0) * (camera.projection[0] - across * camera.projection[3])
-    projection[1] = high / (y1 - y0) * (camera.projection[1] - down * camera.projection[3])
-    width, height = (x1 - x0) * fine, (y1 - y0) * fine
-    with client() as number:
-        for mesh, colour, (at, turn) in bodies:
-            body = add_mesh(number, mesh, colour)
-            p.resetBasePositionAndOrientation(body, at, turn, physicsClientId=number)
-        _, _, image, depth, seg = p.getCameraImage(
-            width, height, camera.view.T.ravel().tolist(), projection.T.ravel().tolist(), lightDirection=SUN,
-            lightColor=[1, 1, 1], lightAmbientCoeff=AMBIENT, lightDiffuseCoeff=DIFFUSE, lightSpecularCoeff=0.0, shadow=0,
-            renderer=p.ER_TINY_RENDERER, physicsClientId=number,
-        )  # fmt: skip
-    return (
-        np.reshape(np.asarray(image, dtype=np.uint8), (height, width, 4))[..., :3],
-        np.array(depth, dtype=np.float32).reshape(height, width),
-        np.reshape(np.asarray(seg, dtype=np.int32), (height, width)),
-    )
+def test_the_union_of_shapes_is_filled_once(scene):
+    painter = Painter(camera(scene), 0.3)
+    painter.pixels[:] = 0, 0, 0, 255
+    painter.fill(discs(np.array([(1.5, 1.2), (1.7, 1.2)]), 0.4), WHITE, 0.5)
+    assert set(np.unique(painter.pixels[..., 0])) & set(range(129, 256)) == set()
 
 
-def drawn(bodies, camera, box, fine):
-    return draw_solids([Solid(mesh, colour, placed(*pose)) for mesh, colour, pose in bodies], camera, box, fine, SUN)
+def test_a_search_without_a_path_yet_draws_none(scene):
+    painter = Painter(camera(scene), 0.3)
+    before = painter.pixels.copy()
+    painter.fill(band(np.zeros((0, 2)), 0.1), WHITE)
+    assert (painter.pixels == before).all()
 
 
-def assert_alike(bodies, camera, fine, least=200):
-    box = (40, 30, 200, 150)
-    image, depth, seg = drawn(bodies, camera, box, fine)
-    wanted_image, wanted_depth, wanted_seg = rendered(bodies, camera, box, fine)
-    seen = (seg >= 0) & (wanted_seg >= 0)
-    assert seen.sum() >= least
-    # TinyRenderer computes in single precision, so a sample on an edge may fall on its other side.
-    assert ((seg >= 0) != (wanted_seg >= 0)).sum() <= 3
-    levels = np.abs(image[seen].astype(int) - wanted_image[seen]).max(axis=1)
-    away = np.abs(depth[seen] - wanted_depth[seen])
-    assert (levels > 1).sum() <= 3
-    assert (away > 1e-5).sum() <= 3
+@pytest.mark.parametrize("name", CAMERAS)
+def test_shapes_behind_the_camera_are_not_drawn(scene, name):
+    painter = Painter(camera_for(name, (-1, -0.6), (1, 0.6), 0.3, SIZE), 0.3)
+    before = painter.pixels.copy()
+    painter.fill([rectangle(-9, -90, 9, -60)], WHITE)
+    assert (painter.pixels == before).all()
+    painter.fill([rectangle(-90, -90, 90, 90)], WHITE)
+    assert (painter.pixels == 255).all()
 
 
-@settings(max_examples=12)
-@given(
-    st.sampled_from(["oblique", "top"]),
-    st.integers(1, 3),
-    st.lists(st.tuples(st.floats(1.0, 4.0), st.floats(1.0, 3.0), st.floats(0.1, 0.6)), min_size=1, max_size=4),
-)
-def test_cylinders_are_drawn_as_tiny_renderer_draws_them(name, fine, places):
-    camera = camera_for(name, (0, 0), (5, 4), 0.6, (240, 180))
-    # Not at round places: where an edge runs through many samples exactly, rounding decides on all of them.
-    bodies = [(cylinder(r, 0.0, 0.6), MOVER, ((x + 0.00137, y - 0.00213, 0.0), UPRIGHT)) for x, y, r in places]
-    assert_alike(bodies, camera, fine, least=0)
-
-
-@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
-@pytest.mark.parametrize(("yaw", "wheels"), [(0.0, (0.0, 0.0)), (2.1, (0.4, -1.7)), (-1.3, (3.0, 3.1))])
-def test_robots_are_drawn_as_tiny_renderer_draws_them(robot, yaw, wheels):
-    camera = camera_for("oblique", (0, 0), (2, 1.6), 0.6, (240, 180))
-    parts = robot_parts(load_robot(robot))
-    bodies = [(part.mesh, part.colour, part_pose(part, 1.0, 0.8, yaw, wheels)) for part in parts]
-    assert_alike(bodies, camera, 2)
-
-
-def test_a_body_that_reaches_behind_the_camera_is_cut_off_there():
-    """A wide cylinder below the camera: its front is drawn and hides the bodies behind it."""
-    camera = camera_for("follow", (-1, -0.6), (1, 0.6), 0.3, (240, 180))
-    eye = np.linalg.inv(camera.view)[:3, 3]
-    wide = cylinder(1.0, 0.0, float(eye[2]) - 0.2)
-    bodies = [(wide, MOVER, ((float(eye[0]), float(eye[1]), 0.0), UPRIGHT))]
-    assert (camera.view @ [*eye[:2], 0.0, 1.0])[2] < 0 < (camera.view @ [eye[0], eye[1] - 1.0, eye[2] - 0.2, 1.0])[2]
-    image, depth, seg = drawn(bodies, camera, (0, 0, 240, 180), 1)
-    # Every sample's ray, by hand: does it meet the roof within the rim?
-    across, down = 2 / 240 / camera.projection[0, 0], 2 / 180 / camera.projection[1, 1]
-    right, up, back = camera.view[:3, :3]
-    for row, col in ((20, 30), (90, 120), (170, 200), (179, 120), (179, 0)):
-        ray = (col - 120) * across * right + (90 - row - 1) * down * up - back
-        if ray[2] >= 0:
-            continue
-        meets = -0.2 / ray[2] * ray[:2]
-        if math.hypot(*meets) < 0.95:
-            assert seg[row, col] == 0, (row, col)
-            assert depth[row, col] < 1
-            assert image[row, col].any()
+def test_a_grid_is_laid_on_its_cells(scene):
+    view = camera(scene, "top")
+    painter = Painter(view, 0.3)
+    painter.pixels[:] = 0, 0, 0, 255
+    opacity = np.zeros((3, 4), dtype=np.uint8)
+    opacity[1, 2] = 255
+    painter.lay(WHITE, opacity, np.array([(1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)]))
+    centre, beside = (view.pixels([(x, y, 0)])[0].astype(int) for x, y in ((2.5, 1.5), (1.5, 1.5)))
+    assert painter.pixels[centre[1], centre[0], 0] == 255
+    assert painter.pixels[beside[1], beside[0], 0] == 0
 
 
 def test_near_bodies_hide_far_ones_in_any_order():
-    camera = camera_for("follow", (0, 0), (4, 3), 0.5, (240, 180))
-    near, far = ((cylinder(0.3, 0.0, z), MOVER, ((2.0, y, 0.0), UPRIGHT)) for y, z in ((1.0, 0.5), (1.6, 0.2)))
-    one, other, alone = (drawn(bodies, camera, (0, 0, 240, 180), 2) for bodies in ([near, far], [far, near], [far]))
-    assert (one[1] == other[1]).all()
-    assert (other[2] == np.array([1, 0, -1])[one[2]]).all()
-    assert 0 < (one[2] == 1).sum() < (alone[2] == 0).sum()
+    view = camera_for("follow", (0, 0), (4, 3), 0.5, SIZE)
+    near, far = post(2.0, 1.0, 0.3, 0.5, GOOD), post(2.0, 1.6, 0.3, 0.2, BAD)
+    one, other, alone = drawn([near, far], view), drawn([far, near], view), drawn([far], view)
+    assert (one == other).all()
+    red, hidden = ((picture[..., 0] > picture[..., 1]).sum() for picture in (alone, one))
+    assert 0 < hidden < red
+
+
+@settings(max_examples=20)
+@given(st.lists(st.tuples(st.floats(0.5, 4.5), st.floats(0.5, 3.5), st.floats(0.1, 0.6)), min_size=2, max_size=5))
+def test_the_nearest_body_on_a_ray_is_the_one_in_the_picture(places):
+    """Disjoint cylinders, against the first of them that the ray through a pixel meets at the height of the ground."""
+    places = [p for k, p in enumerate(places)
+              if all(np.hypot(p[0] - q[0], p[1] - q[1]) > p[2] + q[2] for q in places[:k])]  # fmt: skip
+    view = camera_for("oblique", (0, 0), (5, 4), 0.6, SIZE)
+    tints = [(40 + 40 * k, 0, 200 - 40 * k) for k in range(len(places))]
+    picture = drawn([post(*place, 0.6, tint) for place, tint in zip(places, tints, strict=True)], view)
+    for x, y, radius in places:
+        side = np.array([x, y]) - view.eye[:2]
+        foot = np.array([x, y]) - radius * side / np.hypot(*side)  # of the front
+        col, row = (view.pixels([(*foot, 0.1)])[0]).astype(int)
+        reach = np.linspace(0.0, 1.0, 400)[:, None]
+        ray = view.eye + reach * (np.array([*foot, 0.1]) - view.eye)
+        met = [
+            (
+                reach[((np.hypot(*(ray[:, :2] - place[:2]).T) <= place[2] + 1e-6) & (ray[:, 2] <= 0.6))].min(
+                    initial=2.0
+                ),
+                k,
+            )
+            for k, place in enumerate(places)
+        ]
+        first = min(met)[1]
+        ratio = np.array(tints[first])[[0, 2]] / max(tints[first])
+        seen = picture[row, col][[0, 2]] / max(1, picture[row, col].max())
+        gaps = sorted(hit for hit, _ in met if hit < 2)
+        if len(gaps) < 2 or gaps[1] - gaps[0] > 0.02:
+            assert np.abs(seen - ratio).max() < 0.15
 
 
 def test_a_mesh_is_drawn_from_outside_only():
-    camera = camera_for("top", (0, 0), (5, 4), 0.6, (240, 180))
-    shape = cylinder(0.5, 0.0, 0.6)
-    inside_out = Mesh(shape.vertices, shape.normals, shape.triangles[:, ::-1].copy())
-    for mesh, visible in ((shape, True), (inside_out, False)):
-        seg = drawn([(mesh, MOVER, ((2.5, 2.0, 0.0), UPRIGHT))], camera, (0, 0, 240, 180), 1)[2]
-        roof = seg[80:100, 110:130]
-        assert (roof >= 0).all() == visible
+    view = camera_for("top", (0, 0), (5, 4), 0.6, SIZE)
+    shape = cylinder(1.0, 0.0, 1.0)
+    body = post(2.5, 2.0, 0.5, 0.6, MOVER)
+    inside_out = Part(Mesh(shape.vertices, shape.normals, shape.triangles[:, ::-1].copy()), MOVER)
+    assert drawn([body], view).any()
+    assert not drawn([body._replace(parts=[inside_out])], view)[115:125, 155:165].any()
 
 
-def test_boxes_overlap_where_they_share_a_pixel():
-    a, beside, inside = (0, 0, 10, 10), (10, 0, 20, 10), (9, 9, 12, 12)
-    assert not overlap(a, beside)
-    assert overlap(a, inside)
-    assert overlap(inside, beside)
-    assert merged([a, beside]) == [a, beside]
-    assert merged([a, beside, inside]) == [(0, 0, 20, 12)]
+def test_a_hit_is_hidden_by_a_body_before_it(scene):
+    view = camera_for("follow", (0, 0), (4, 3), 0.5, SIZE)
+    hits = np.array([(2.0, 0.65, 0.2), (2.0, 1.35, 0.2)])  # before and behind
+    painter = Painter(view, 0.6)
+    painter.draw_bodies([post(2.0, 1.0, 0.3, 0.5, MOVER)], hits=hits)
+    near, far = (painter.pixels[row, col, :3].astype(int) for col, row in view.pixels(hits).astype(int))
+    assert np.abs(near - HIT).max() < 0.5 * np.abs(far - HIT).max()

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.views.film import lidar_view
+from antdrive.views.film import lidar_view, painter
 from antdrive.views.film.camera import CAMERAS
 from antdrive.views.film.overlay import legend_entries
 from antdrive.views.film.shot import Shot
-from antdrive.views.map_reconstruction import MapReconstruction, enclosing_cylinders, world_points
+from antdrive.views.map_reconstruction import MapReconstruction, enclosed, world_points
 from antdrive.views.scene import Scene
 from tests.made_up_drive import scanned
 from tests.records import changed
@@ -60,7 +60,7 @@ def test_obstacles_are_pale_until_a_beam_meets_them(log, spots):
             assert (shown[spot].mean() > 180) == (seen.met[j] > at), (j, at)
 
 
-def test_ground_is_hatched_until_it_is_seen(log, spots, monkeypatch):
+def test_ground_is_veiled_until_it_is_seen(log, spots, monkeypatch):
     with_fan = picture(log, "top", 0.0)
     monkeypatch.setattr(lidar_view.OwnMapPainter, "draw_beams", lambda *_: None)
     first, last = (picture(log, "top", at) for at in (0.0, log.t[-1]))
@@ -79,7 +79,6 @@ def test_ground_is_hatched_until_it_is_seen(log, spots, monkeypatch):
     known = [known_ground(r, places) for r in (before, after)]
     fresh, old = (spots(places[clear & chosen]) for chosen in (~known[0] & known[1], known[0]))
     assert min(len(fresh[0]), len(old[0])) > 20
-    assert np.ptp(first[fresh].mean(axis=1)) > 15  # lines
     assert last[fresh].mean() > first[fresh].mean() + 6
     assert abs(last[old].mean() - first[old].mean()) < 1
 
@@ -91,7 +90,7 @@ def test_a_picture_depends_on_the_moment_alone(log, camera):
 
 def test_hits_are_where_the_map_has_them(log, monkeypatch):
     with_hits = picture(log, "top", 0.3)
-    monkeypatch.setattr(lidar_view.OwnMapPainter, "draw_hits", lambda *_: None)
+    monkeypatch.setattr(painter.Painter, "_draw_hits", lambda *_: None)
     painted = np.abs(with_hits - picture(log, "top", 0.3)).max(axis=-1) > 40
     seen = MapReconstruction(log)
     seen.advance(0.3)
@@ -102,32 +101,33 @@ def test_hits_are_where_the_map_has_them(log, monkeypatch):
     apart = np.hypot(cols[:, None] + 0.5 - spots[:, 0], rows[:, None] + 0.5 - spots[:, 1])
     assert len(rows) > 100
     assert apart.min(axis=1).max() < 3.5  # painted nowhere else
-    assert (apart.min(axis=0) < 3).mean() > 0.95  # and everywhere there
+    assert (apart.min(axis=0) < 3).mean() > 0.8  # and there, unless a body hides it
 
 
-def test_what_stands_inside_a_cylinder_looks_like_it(log):
-    around = enclosing_cylinders(np.array([[0, 0, 0.5, 1], [0.1, 0, 0.2, 1], [2, 0, 0.2, 1], [0.6, 0, 0.3, 1.0]]))
-    assert around.tolist() == [0, 0, 2, 3]
+def test_a_cylinder_within_another_is_enclosed():
+    posts = np.array([[0, 0, 0.5, 1], [0.1, 0, 0.2, 1], [2, 0, 0.2, 1], [0.6, 0, 0.3, 1.0], [2, 0, 0.2, 1]])
+    assert enclosed(posts).tolist() == [False, True, False, False, True]
 
 
 def test_the_legend_names_all_painted_objects(log):
     scene = Scene.of(log)
     assert not scene.has_no_go_area
-    plain = {entry.text for entry in legend_entries(scene, 0.5, 0.01)}
-    named = {entry.text for entry in legend_entries(scene, 0.5, 0.01, beams=True, own_map=True)}
+    plain = {entry.text for entry in legend_entries(scene)}
+    named = {entry.text for entry in legend_entries(scene, beams=True, own_map=True)}
     assert named - plain == {"lidar beams", "lidar hit on the occupancy map", "unknown ground"}
     assert not any("inflated" in text for text in named)
     hidden = [replace(scene, mapped=mapped, unseen=np.ones_like(scene.unseen)) for mapped in (True, False)]
-    given, none = ({entry.text for entry in legend_entries(one, 0.5, 0.01)} for one in hidden)
+    given, none = ({entry.text for entry in legend_entries(one)} for one in hidden)
     assert "placed after planning" in given - none
     assert none - plain == {"not in the world file"}
 
 
 def test_only_tracked_movers_get_rings(log):
     shot = Shot(log, camera="top", size=SIZE, bare=True)
-    pose, movers = shot.playback.pose(0.0), np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
-    plain = shot._compositor.frame(pose).astype(int)
-    ringed = shot._compositor.frame(pose, tracked=movers).astype(int)
+    shot.view(0.0)
+    movers = np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
+    actors = [shot.drives[0].actor(0.0, last=False)]
+    plain, ringed = (shot._compositor.frame_of(actors, tracked=shown).astype(int) for shown in (None, movers))
     x, y = (np.array(shot._compositor.pixel(*at)) for at in ((3.0, 2.0), (3.55, 2.0)))
     rows, cols = np.nonzero(np.abs(ringed - plain).max(axis=-1) > 20)
     away = np.hypot(cols + 0.5 - x[0], rows + 0.5 - x[1])
@@ -136,7 +136,7 @@ def test_only_tracked_movers_get_rings(log):
     assert np.abs(away[ring] - math.dist(x, y)).max() < 4
     red, green, blue = ringed[rows, cols].mean(axis=0)
     assert min(red, blue) > green + 25
-    labels = {entry.text for entry in legend_entries(Scene.of(log), 0.5, 0.01, tracked=True)}
+    labels = {entry.text for entry in legend_entries(Scene.of(log), tracked=True)}
     assert "mover tracked by lidar, next 1.5 s" in labels
 
 
@@ -191,16 +191,12 @@ def test_obstacles_are_met_when_a_beam_first_ends_on_them(far):
     assert seen.met.tolist() == expected.tolist()
 
 
-def test_what_was_seen_grows_whatever_the_steps(far):
+def test_what_was_seen_is_the_same_whatever_the_steps(far):
     once, stepwise = MapReconstruction(far), MapReconstruction(far)
-    grown = []
     for at in np.arange(0.0, far.t[-1] + 0.03, 0.03):
         stepwise.advance(at)
-        grown.append(stepwise.explored)
     once.advance(far.t[-1])
     assert np.array_equal(once.seen, stepwise.seen)
-    assert (np.diff(grown) >= 0).all()
-    assert 5.0 < grown[0] < grown[-1] < 6.3 * 4.3
     assert np.array_equal(once.map.discs(), stepwise.map.discs())
 
 

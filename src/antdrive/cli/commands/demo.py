@@ -18,7 +18,7 @@ OPENERS = {"darwin": "open", "win32": 'start ""'}  # elsewhere xdg-open
 def demo(
     *, context: typer.Context, out: Annotated[Path, option("FOLDER", "Output folder.")] = Path("out") / "demo"
 ) -> int:
-    """Film ants beside A*: both plan, drive and are certified.
+    """Film ants and A* in one picture, planning and driving.
 
     The last line of the output is the command that opens the film.
     """

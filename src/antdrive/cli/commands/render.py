@@ -1,5 +1,6 @@
 """`antdrive render`."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,25 +10,18 @@ from antdrive.cli import options
 from antdrive.cli.console import show
 from antdrive.cli.options import argument, option
 from antdrive.cli.output import film_drives
-from antdrive.cli.parse import size as parse_size
 
 
+@options.with_settings()
 def render(
-    rollouts: Annotated[list[Path], argument("ROLLOUT", "Logs or folders of runs; two to six play side by side.")],
-    out: Annotated[Path, option("FILE", "Film (.mp4, .gif, .webp) or frame (.png).")],
-    camera: Annotated[str, option("NAME", "View: oblique, top or follow.")] = "oblique",
-    size: Annotated[
-        str | None,
-        option(
-            "WIDTHxHEIGHT",
-            "Picture size [px]; several drives in top view crop the default to their worlds.",
-            show_default="1280x720",
-        ),
+    *,
+    rollouts: Annotated[list[Path], argument("ROLLOUT", "Logs or folders of runs; up to six share a picture.")],
+    out: Annotated[Path, option("FILE", "Film (.mp4, .gif, .webp) or frame (.png).", panel="Output")],
+    filming: options.Filming,
+    fps: Annotated[int, option("NUMBER", "Frames per second.", panel="Output", min=1, max=240)] = 30,
+    at: Annotated[
+        float | None, option("SECONDS", "Write the frame at this time [s] (.png or .webp).", panel="Output", min=0.0)
     ] = None,
-    fps: Annotated[int, option("NUMBER", "Frames per second.", min=1, max=240)] = 30,
-    speed: options.Speed = 1.0,
-    at: Annotated[float | None, option("SECONDS", "Write the frame at this time [s] (.png or .webp).", min=0.0)] = None,
-    prelude: options.Prelude = 0.0,
     planner: options.LogPlanner = None,
     json: options.Json = False,
 ) -> None:
@@ -41,15 +35,21 @@ def render(
     if planner is not None:
         load_planner(planner)  # known by its class, as the log names it
     logs = [Rollout.load(log_at(path)) for path in rollouts]
-    shape: dict[str, Any] = {} if size is None else {"size": parse_size(size)}
     one_frame = at is not None or out.suffix.lower() == ".png"
     if len(logs) > 1 and one_frame:
         raise InputError(f"--out {out}: several rollouts need a film format")
     if one_frame:
+        from antdrive.views.film.film_options import STILLS
         from antdrive.views.film.video import still
 
-        still(logs[0], out, at, camera=camera, **shape)
+        if out.suffix.lower() not in STILLS:
+            raise InputError(f"--out {out}: --at writes a still, {' or '.join(STILLS)}")
+        still(logs[0], out, at, **filming.shape())
         facts: dict[str, Any] = {"file": str(out), "frames": 1}
     else:
-        facts = film_drives(logs, out, camera=camera, **shape, fps=fps, speed=speed, prelude=prelude)
+        planners = Counter(log.record.planner.name for log in logs)
+        names = [log.record.planner.name for log in logs]
+        names = [f"{name} {path}" if planners[name] > 1 else name for name, path in zip(names, rollouts, strict=True)]
+        given = {"fps": fps, "speed": filming.speed, "prelude": filming.prelude}
+        facts = film_drives(dict(zip(names, logs, strict=True)), out, **filming.shape(), **given)
     show(json, facts, file_lines({"film": facts["file"]}))

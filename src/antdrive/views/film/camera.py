@@ -1,4 +1,4 @@
-"""Pinhole cameras: framing, projection and visibility."""
+"""Pinhole cameras: framing and projection."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.types import Flags, Floats
+from antdrive.base.types import Floats
 
 Picture: TypeAlias = npt.NDArray[np.uint8]  # (H, W, 3), red, green, blue
 
@@ -26,7 +26,7 @@ class Camera:
     """Pinhole camera. Pixels count from the upper left corner, x to the right and y down."""
 
     view: Floats  # world to camera (4, 4)
-    projection: Floats  # camera to clip space (4, 4)
+    projection: Floats  # camera to clip space (4, 4), without depth
     size: tuple[int, int]  # width and height of the picture [px]
 
     @classmethod
@@ -50,10 +50,17 @@ class Camera:
         view = np.eye(4)
         view[:3, :3] = basis
         view[:3, 3] = -np.array([cx, cy, -cz])
-        near, far = float(depth.min()) - cz, float(depth.max()) - cz
-        near, far = max(0.5 * near, 1e-2), 1.5 * far + 1.0
-        clip = [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)]
-        return cls(view, np.array([[1 / tan_x, 0, 0, 0], [0, 1 / tan_y, 0, 0], clip, [0, 0, -1, 0]]), size)
+        return cls(view, np.array([[1 / tan_x, 0, 0, 0], [0, 1 / tan_y, 0, 0], [0, 0, 0, 0], [0, 0, -1, 0]]), size)
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether it looks along -x."""
+        return bool(abs(self.view[0, 0]) < 0.5)
+
+    @property
+    def eye(self) -> Floats:
+        """Its position (3,) [m]."""
+        return np.asarray(-self.view[:3, :3].T @ self.view[:3, 3])
 
     @cached_property
     def full(self) -> Floats:
@@ -89,15 +96,6 @@ class Camera:
         ndc = clip[:, :2] / clip[:, 3:]
         return np.column_stack([(1 + ndc[:, 0]) * width / 2, (1 - ndc[:, 1]) * height / 2])
 
-    def sees(self, centres: Floats, radii: Floats) -> Flags:
-        """Return which balls at centres (N, 3) with radii (N,) [m] may be visible; balls behind the camera are not."""
-        x, y, z = (centres @ self.view[:3, :3].T + self.view[:3, 3]).T
-        depth = -z
-        inside: Flags = depth > radii
-        for aside, scale in ((x, self.projection[0, 0]), (y, self.projection[1, 1])):
-            inside &= np.abs(aside) * scale <= depth + radii * math.hypot(1.0, scale)
-        return inside
-
     def moved(self, x: float, y: float) -> Camera:
         """Return the camera shifted along the ground [m]."""
         shift = np.eye(4)
@@ -105,18 +103,17 @@ class Camera:
         return Camera(self.view @ shift, self.projection, self.size)
 
 
-def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float, size: tuple[int, int]) -> Camera:
-    """Return the named camera that shows a ground rectangle and the bodies on it."""
+def camera_for(
+    name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float, size: tuple[int, int], turned: bool | None = None
+) -> Camera:
+    """Return the named camera that shows a ground rectangle and the bodies on it; None: `turned` if that fills the picture."""
     (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     corners = np.array([(x, y, z) for x in (x0, x1) for y in (y0, y1) for z in (0.0, height)])
     tilt, fov = _TILT[name], _FOV[name]
-    shape = (x1 - x0) / ((y1 - y0) * math.sin(math.radians(tilt)))
-    return Camera.framing(corners, size, tilt=tilt, fov=fov, turned=name != "follow" and turns(shape, size))
-
-
-def turns(shape: float, size: tuple[int, int]) -> bool:
-    """Return whether to turn the view along -x: the ground (`shape`: width over height) is tall, the picture wide."""
-    return shape < 0.75 and size[0] > size[1]
+    if turned is None:  # the ground is tall, the picture wide
+        shape = (x1 - x0) / ((y1 - y0) * math.sin(math.radians(tilt)))
+        turned = name != "follow" and shape < 0.75 and size[0] > size[1]
+    return Camera.framing(corners, size, tilt=tilt, fov=fov, turned=turned)
 
 
 def _axes(tilt: float, turned: bool) -> tuple[Floats, Floats, Floats]:

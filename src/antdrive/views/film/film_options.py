@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from base64 import b64encode
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
@@ -14,8 +14,16 @@ from urllib.parse import quote
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import MAX_BYTES, format_size, read_bytes
+from antdrive.views.colours import BAD, CONTACT, CRUISE, FIELD_STOPS, GOOD, LIMITER_COLOURS, PLANNER_COLOURS, hexed
 from antdrive.views.film.camera import CAMERAS
 
+#: ffmpeg's filters that keep the first frame and paint colours of later ones into it.
+_LATER = "select=eq(n\\,0)" + "".join(
+    f",drawbox=0:{8 * k}:64:8:0x{tint[1:]}:fill"
+    for k, tint in enumerate(
+        (*LIMITER_COLOURS, *map(hexed, (BAD, CONTACT, CRUISE, GOOD, *FIELD_STOPS, *PLANNER_COLOURS)))
+    )
+)
 #: ffmpeg's options by file suffix.
 ENCODERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -24,9 +32,9 @@ ENCODERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
             *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"),
             *("-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-movflags", "+faststart"),
         ),
-        # A palette per frame: a common palette would hold the whole film in memory.
+        # The palette is that of the first frame and of colours that come later: the whole film is never in memory.
         ".gif": (
-            *("-vf", "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"),
+            *("-vf", f"split[a][b];[a]{_LATER},palettegen=stats_mode=single[p];[b][p]paletteuse=dither=none"),
             *("-c:v", "gif", "-loop", "0"),
         ),
         ".webp": (
@@ -46,16 +54,20 @@ STILLS: dict[str, dict[str, Any]] = {
 class FilmOptions:
     """Options of a film."""
 
-    camera: str = "oblique"  # the camera's name
+    camera: str | None = None  # the camera's name; None: follow, of several drives oblique
     size: tuple[int, int] = (1280, 720)  # width and height [px]
     fps: float = 30.0  # frames per second
     speed: float = 1.0  # of the film, relative to the run
-    note: str | None = None  # line in the band below the picture
+    note: str | None = None  # line in the band above the picture
 
-    def checked(self) -> FilmOptions:
-        """Return the options; raise `InputError` if one is invalid."""
+    def checked(self, *, several: bool = False) -> FilmOptions:
+        """Return the options with a camera; raise `InputError` if one is invalid. `several`: of several drives."""
+        if self.camera is None:
+            return replace(self, camera="oblique" if several else "follow").checked()
         if self.camera not in CAMERAS:
             raise InputError(f"camera: unknown camera {self.camera!r}; choose one of {', '.join(CAMERAS)}")
+        if several and self.camera == "follow":
+            raise InputError("camera: follow shows one drive; choose oblique or top for several")
         if len(self.size) != 2 or any(side % 2 or not 160 <= side <= 4096 for side in self.size):
             raise InputError(f"size: width and height must be even numbers from 160 to 4096, got {self.size}")
         for key, value in (("fps", self.fps), ("speed", self.speed)):

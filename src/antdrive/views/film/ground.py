@@ -5,53 +5,82 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base.plane import segment_lengths
 from antdrive.base.types import Floats
-from antdrive.views.colours import GOAL, GRID, GROUND, PAPER, ROUTE, START, ZONE, Colour
-from antdrive.views.film import _kernels_paint as kernels
+from antdrive.views.colours import GOAL, GRID, GROUND, INK, KERB, PAPER, START, ZONE, mixed
 from antdrive.views.film.camera import Camera
+from antdrive.views.film.painter import Painter
 from antdrive.views.scene import Scene
 
-Mask = npt.NDArray[np.bool_]
-
-SHADOW_DEPTH = 0.30  # fraction of the light that the deepest shadow removes
-SHADOW_TINT = (1.0, 0.94, 0.80)  # of red, green and blue: outdoor shadows are slightly blue
-RING_SIDES = 64  # of a circle
-
-
-def paint_ground(
-    camera: Camera, scene: Scene, route: Floats, ground: Mask, tall: Floats, sun: tuple[float, float]
-) -> npt.NDArray[np.float32]:
-    """Paint the ground (H, W, 3) for a camera."""
-    width, height = camera.size
-    brush = _Brush(camera, ground)
-    under = kerb_width(scene) / 2  # the kerb hides the floor's edge
-    bounds = np.array(scene.bounds) + np.array([-under, -under, under, under])
-    step = grid_step(camera)
-    tints = np.array([GROUND, PAPER, GRID], dtype=np.float64)
-    kernels.lay_floor(brush.rgb, ground, brush.inside, brush.inverse, bounds, step, 1.0, tints)
-    line = 1.5 * camera.pixel
-    if scene.has_no_go_area:
-        brush.zones(scene, line)
-    shade = np.ones((height, width), dtype=np.float32)
-    cylinders = scene.obstacles.copy()
-    cylinders[:, 3] = tall
-    kernels.cast_shadows(shade, brush.forward, brush.inverse, cylinders, *sun, SHADOW_DEPTH)
-    for channel, tint in enumerate(SHADOW_TINT):
-        brush.rgb[..., channel] *= 1 - tint * (1 - shade)
-    if len(route) > 1:
-        brush.capsules(dashes(route, line), ROUTE, 0.85)
-    brush.start(scene, line)
-    brush.goal(scene, line)
-    return brush.rgb
+ARC = np.linspace(-math.pi / 2, math.pi / 2, 7)  # directions of the points on the end of a thin line [rad]
+ROUND = np.linspace(-math.pi / 2, math.pi / 2, 25)  # and of a disc
+SUN = np.array([0.55, 0.28])  # extent of shadows to the camera's right and ahead, per metre of height
+LAYERS = (2, 1, 0, -1, -2)  # of a shadow, by growth in steps: at most 0.015 m or 3 px
+SHADOW = 0.055  # opacity of a layer
+MOST_LINES = 200  # of the grid, in each direction
 
 
-def kerb_width(scene: Scene) -> float:
-    """Return the width of the kerb around the world [m]."""
+def paint_ground(painter: Painter, scene: Scene, tall: Floats, step: float) -> None:
+    """Paint the ground with grid lines every `step` [m]; `tall` (N,): heights of the obstacles [m]."""
+    camera, line = painter.camera, 1.5 * painter.camera.pixel
     x0, y0, x1, y1 = scene.bounds
-    return min(0.12, 0.02 * min(x1 - x0, y1 - y0))
+    painter.fill([rectangle(*painter.low, *painter.high)], GROUND)
+    seen = painter.near(scene.obstacles[:, :2], scene.obstacles[:, 2] + scene.inflate + 2 * tall)
+    if scene.has_no_go_area:
+        known = scene.obstacles[seen & ~scene.unseen]
+        for reach, tint in (
+            (scene.inflate, mixed(GROUND, ZONE, 0.5)),
+            (scene.inflate - line, mixed(GROUND, ZONE, 0.2)),
+        ):
+            walls = [
+                rectangle(x0, y0, x0 + reach, y1),
+                rectangle(x1 - reach, y0, x1, y1),
+                rectangle(x0, y0, x1, y0 + reach),
+                rectangle(x0, y1 - reach, x1, y1),
+            ]
+            painter.fill([*discs(known[:, :2], known[:, 2] + reach), *walls] if reach > 0 else [], tint)
+    (left, low), (right, high) = np.maximum(painter.low, (x0, y0)), np.minimum(painter.high, (x1, y1))
+    across = [(x, low, x, high) for x in step * np.arange(math.ceil(left / step), right / step)[:MOST_LINES]]
+    along = [(left, y, right, y) for y in step * np.arange(math.ceil(low / step), high / step)[:MOST_LINES]]
+    rows = np.array([*across, *along]).reshape(-1, 4)
+    painter.fill(capsules(rows[:, :2], rows[:, 2:], 0.5 * camera.pixel), GRID, 0.8)
+    cylinders = scene.obstacles[seen]
+    paint_shadow(painter, cylinders[:, :2], cylinders[:, 2], tall[seen])
+    paint_edge(painter, scene)
+    _paint_ends(painter, scene, line)
+
+
+def paint_edge(painter: Painter, scene: Scene) -> None:
+    """Paint the surroundings of the world, and a line around it."""
+    x0, y0, x1, y1 = scene.bounds
+    inside, wide = rectangle(*scene.bounds)[::-1], min(0.12, 0.02 * min(x1 - x0, y1 - y0))
+    painter.fill([rectangle(*painter.low, *painter.high), inside], PAPER)
+    painter.fill([rectangle(x0 - wide, y0 - wide, x1 + wide, y1 + wide), inside], KERB)
+
+
+def _paint_ends(painter: Painter, scene: Scene, line: float) -> None:
+    """Mark the start with a ring of the robot's size and a tick along its heading, and the goal with its tolerance."""
+    x, y, yaw = scene.start
+    radius, ahead = scene.robot.footprint.radius + line, np.array([math.cos(yaw), math.sin(yaw)])
+    tick = np.array([[x, y]]) + radius * ahead
+    painter.fill(
+        [*ring(x, y, radius, 0.8 * line), *capsules(tick, tick + 0.5 * radius * ahead, 0.8 * line)], START, 0.9
+    )
+    place, radius = np.array([scene.goal]), scene.goal_tolerance
+    painter.fill(discs(place, radius), GOAL, 0.22)
+    painter.fill(ring(*scene.goal, radius, 0.9 * line), GOAL, 0.95)
+    painter.fill(discs(place, max(0.10 * radius, 1.4 * line)), GOAL, 0.95)
+
+
+def paint_shadow(painter: Painter, places: Floats, radii: Floats | float, tall: Floats | float) -> None:
+    """Paint the shadows of cylinders of heights `tall` at places (N, 2) [m]."""
+    right = painter.camera.view[0, :2]
+    sun = SUN[0] * right + SUN[1] * np.array([-right[1], right[0]])
+    ends = places + np.outer(np.broadcast_to(tall, len(places)), sun)
+    step = min(0.015, 3 * painter.camera.pixel)
+    for layer in LAYERS:
+        painter.fill(capsules(places, ends, np.maximum(radii + layer * step, 0.0), ROUND), INK, SHADOW)
 
 
 def grid_step(camera: Camera) -> float:
@@ -63,89 +92,46 @@ def grid_step(camera: Camera) -> float:
     return 100.0
 
 
-def capsules(starts: Floats, ends: Floats, half: float | Floats) -> Floats:
-    """Return capsules (N, 5) from `starts` (N, 2) to `ends` (N, 2): ax, ay, bx, by, half width [m]."""
-    return np.ascontiguousarray(np.column_stack([starts, ends, np.full(len(starts), half)]))
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> Floats:
+    """Return a rectangle (4, 2) [m]."""
+    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
 
 
-def ring(x: float, y: float, radius: float, half: float) -> Floats:
-    """Return capsules (N, 5) that draw a circle with half the width of a line [m]."""
-    turn = np.linspace(0, 2 * math.pi, RING_SIDES + 1)
-    rim = np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
-    return capsules(rim[:-1], rim[1:], half)
+def discs(centres: Floats, radii: Floats | float) -> Floats:
+    """Return discs (N, K, 2) at centres (N, 2) [m]."""
+    return capsules(centres, centres, radii, ROUND)
+
+
+def capsules(starts: Floats, ends: Floats, half: Floats | float, arc: Floats = ARC) -> Floats:
+    """Return polygons (N, K, 2) around segments from `starts` (N, 2) to `ends` (N, 2) with half a width [m]."""
+    ahead = np.arctan2(*(ends - starts).T[::-1])[:, None]
+    turns = np.hstack([ahead + arc, ahead + math.pi + arc])
+    rims = np.stack([np.cos(turns), np.sin(turns)], axis=-1) * np.broadcast_to(half, len(starts))[:, None, None]
+    return np.asarray(np.stack([ends, starts], axis=1).repeat(len(arc), axis=1) + rims)
+
+
+def ring(x: float, y: float, radius: float, half: float) -> list[Floats]:
+    """Return a circle with half the width of a line [m]: its outer rim, and its inner rim in the other sense."""
+    (outer,), (inner,) = (discs(np.array([(x, y)]), max(radius + off, 0.0)) for off in (half, -half))
+    return [outer, inner[::-1]]
+
+
+def band(line: Floats, half: float) -> list[Floats]:
+    """Return polygons around a polyline (N, 2) with half a width [m] and round ends; none without two points."""
+    if len(line) < 2:
+        return []
+    ahead = np.gradient(line, axis=0)
+    aside = half * np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    aside /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    return [np.vstack([line - aside, (line + aside)[::-1]]), *discs(line[[0, -1]], half)]
 
 
 def dashes(line: Floats, width: float) -> Floats:
-    """Return capsules (M, 5) that draw a polyline (N, 2) dashed with a line width [m]."""
+    """Return polygons (M, K, 2) that draw a polyline (N, 2) dashed with a line width [m]."""
     on, off = 7 * width, 5 * width
-    steps = segment_lengths(line)
-    arc = np.concatenate([[0.0], np.cumsum(steps)])
+    arc = np.concatenate([[0.0], np.cumsum(segment_lengths(line))])
     starts = np.arange(0.0, arc[-1], on + off)
     at = np.unique(np.concatenate([arc, starts, np.minimum(starts + on, arc[-1])]))
     points = np.column_stack([np.interp(at, arc, line[:, 0]), np.interp(at, arc, line[:, 1])])
-    rows = capsules(points[:-1], points[1:], 0.9 * width)
-    return np.ascontiguousarray(rows[(at[:-1] + at[1:]) / 2 % (on + off) < on])
-
-
-class _Brush:
-    """Colours of the ground, and a coverage mask through which shapes are painted."""
-
-    def __init__(self, camera: Camera, ground: Mask) -> None:
-        width, height = camera.size
-        self.forward = camera.ground
-        self.inverse = np.linalg.inv(self.forward)
-        self.inside = np.empty_like(ground)  # the ground within the world's bounds
-        self.rgb = np.zeros((height, width, 3), dtype=np.float32)
-        self.cover = np.zeros((height, width), dtype=np.float32)
-
-    def blend(self, colour: Colour, strength: float) -> None:
-        """Blend a colour into the covered pixels and clear the mask."""
-        kernels.blend_cover(self.rgb, self.cover, self.inside, np.array(colour, dtype=np.float64), strength)
-
-    def capsules(self, rows: Floats, colour: Colour, strength: float) -> None:
-        """Paint capsules (N, 5): ax, ay, bx, by, half width [m]."""
-        kernels.cover_capsules(self.cover, self.forward, self.inverse, rows)
-        self.blend(colour, strength)
-
-    def zones(self, scene: Scene, line: float) -> None:
-        """Tint the no-go area and draw its outline."""
-        kernels.cover_capsules(self.cover, self.forward, self.inverse, _zone_rows(scene, 0.0))
-        outer = self.cover.copy()
-        self.blend(ZONE, 0.20)
-        kernels.cover_capsules(self.cover, self.forward, self.inverse, _zone_rows(scene, line))
-        np.subtract(outer, self.cover, out=self.cover)
-        self.blend(ZONE, 0.38)
-
-    def start(self, scene: Scene, line: float) -> None:
-        """Mark the start with a ring of the robot's size and a tick along its heading."""
-        x, y, yaw = scene.start
-        radius = scene.robot.footprint.radius + line
-        self.capsules(ring(x, y, radius, 0.8 * line), START, 0.9)
-        dx, dy = math.cos(yaw), math.sin(yaw)
-        tick = [(x + radius * dx, y + radius * dy, x + 1.5 * radius * dx, y + 1.5 * radius * dy, 0.8 * line)]
-        self.capsules(np.array(tick), START, 0.9)
-
-    def goal(self, scene: Scene, line: float) -> None:
-        """Mark the goal's tolerance disc and its centre."""
-        (x, y), radius = scene.goal, scene.goal_tolerance
-        self.capsules(np.array([(x, y, x, y, radius)]), GOAL, 0.22)
-        self.capsules(ring(x, y, radius, 0.9 * line), GOAL, 0.95)
-        self.capsules(ring(x, y, 0.5 * radius, 0.5 * line), GOAL, 0.6)
-        self.capsules(np.array([(x, y, x, y, max(0.10 * radius, 1.4 * line))]), GOAL, 0.95)
-
-
-def _zone_rows(scene: Scene, shrink: float) -> Floats:
-    """Return the no-go area as capsules (N, 5), shrunk by `shrink` [m]."""
-    x, y, radius, _ = scene.obstacles[~scene.unseen].T
-    reach = scene.inflate - shrink
-    discs = np.column_stack([x, y, x, y, radius + reach])
-    x0, y0, x1, y1 = scene.bounds
-    far = 2 * scene.inflate
-    walls = [
-        (x0, y0 - far, x0, y1 + far, reach),
-        (x1, y0 - far, x1, y1 + far, reach),
-        (x0 - far, y0, x1 + far, y0, reach),
-        (x0 - far, y1, x1 + far, y1, reach),
-    ]
-    rows = np.vstack([discs, walls])
-    return np.ascontiguousarray(rows[rows[:, 4] > 0])
+    drawn = (at[:-1] + at[1:]) / 2 % (on + off) < on
+    return capsules(points[:-1][drawn], points[1:][drawn], 0.9 * width)

@@ -2,56 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
-import numpy.typing as npt
 
-from antdrive.base.types import Floats
+from antdrive.base.types import Flags, Floats
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import beams_of, lidar_of
-from antdrive.views import _kernels_seen as kernels
-from antdrive.views.colours import BEAM, HATCH, HIT, PALE, Colour
-from antdrive.views.film import _kernels_paint as painting
-from antdrive.views.film.camera import Camera, Picture
+from antdrive.views.colours import BEAM, PALE
 from antdrive.views.film.ground import capsules
-from antdrive.views.map_reconstruction import MapReconstruction, enclosing_cylinders, world_points
-from antdrive.views.scene import Scene
+from antdrive.views.film.painter import Painter
+from antdrive.views.map_reconstruction import MapReconstruction, world_points
 
-VEIL, LINES = 0.62, 0.75  # opacity of the veil over unknown ground and of its hatching
+VEIL = 190  # opacity of the veil over unknown ground, 0 to 255
 PALENESS = 0.80  # of undetected obstacles
 TINT, BEAMS = 0.13, 0.30  # opacity of the scanned area and of the beams
 DRAWN_BEAMS = 90  # maximum number of drawn beams in a full circle
-HATCHING = 9.0  # spacing of the hatching [px]
-
-
-@dataclass(frozen=True, eq=False)
-class Backdrop:
-    """Picture of all static bodies by one camera."""
-
-    camera: Camera
-    pixels: Picture  # the picture (H, W, 3)
-    visible: npt.NDArray[np.float32]  # fraction of each pixel that shows ground (H, W)
-    # depth of the bodies in clip space at the rendered resolution, 1 for ground
-    depth: npt.NDArray[np.float32]
-    bodies: npt.NDArray[np.int32]  # index of the visible obstacle at the rendered resolution, -1 for ground
-
-    @cached_property
-    def forward(self) -> Floats:
-        """Homography (3, 3) from the ground to pixels."""
-        return self.camera.ground
-
-    @cached_property
-    def inverse(self) -> Floats:
-        """Homography (3, 3) from pixels to the ground."""
-        return np.asarray(np.linalg.inv(self.forward))
-
-    def blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float, *, over: bool = False) -> None:
-        """Blend capsules (N, 5) of one colour into the ground of a frame, or over all bodies."""
-        visible = np.ones_like(self.visible) if over else self.visible
-        tint = np.array(colour, dtype=np.float64)
-        painting.blend_capsules(frame, visible, self.forward, self.inverse, rows, tint, strength)
 
 
 class BeamPainter:
@@ -66,55 +30,52 @@ class BeamPainter:
         """Advance to a time [s]."""
         self._last = max(0, int(np.searchsorted(self._times, at + 1e-9, side="right")) - 1)
 
-    def draw_beams(self, frame: Picture, backdrop: Backdrop) -> None:
+    def draw_beams(self, painter: Painter) -> None:
         """Draw the beams of the last scan on the ground."""
-        lidar, (eye, first, reaches) = self._lidar, beams_of(self._rollout, self._last)
-        every = max(1, round(2 * np.pi / lidar.spacing / DRAWN_BEAMS))
-        style, colour = np.array([TINT, BEAMS, backdrop.camera.pixel]), np.array(BEAM, dtype=np.float64)
-        fan = (eye, first, lidar.spacing, lidar.full_circle, reaches, every)
-        kernels.lay_fan(frame, backdrop.visible, backdrop.forward, backdrop.inverse, *fan, style, colour)
+        lidar, ((x, y, yaw), first, reaches) = self._lidar, beams_of(self._rollout, self._last)
+        turns, eye = yaw + first + lidar.spacing * np.arange(len(reaches)), np.array([(x, y)])
+        ways = reaches[:, None] * np.column_stack([np.cos(turns), np.sin(turns)])
+        room = np.where(ways > 0, painter.high - eye, painter.low - eye) / np.where(ways == 0, 1e-9, ways)
+        ends = eye + ways * np.clip(room.min(axis=1), 0.0, 1.0)[:, None]  # within the visible ground
+        painter.fill([ends if lidar.full_circle else np.vstack([eye, ends])], BEAM, TINT)
+        drawn = ends[:: max(1, round(2 * np.pi / lidar.spacing / DRAWN_BEAMS))]
+        painter.fill(capsules(np.repeat(eye, len(drawn), axis=0), drawn, 0.5 * painter.camera.pixel), BEAM, BEAMS)
 
 
 class OwnMapPainter(BeamPainter):
     """Painter of a mapless robot's occupancy map. Times must be requested in increasing order."""
 
-    def __init__(self, rollout: Rollout, scene: Scene) -> None:
+    def __init__(self, rollout: Rollout) -> None:
         super().__init__(rollout)
-        self._reconstruction, self._scene = MapReconstruction(rollout), scene
+        self._reconstruction = MapReconstruction(rollout)
         self._drift = self._reconstruction.drift(0.0)
-        self._discs = np.empty((0, 3))
-        self._around = enclosing_cylinders(scene.obstacles)
 
     def advance(self, at: float) -> None:
         """Advance to a time [s]."""
         super().advance(at)
-        reconstruction = self._reconstruction
-        reconstruction.advance(at)
-        self._drift = reconstruction.drift(at)
-        discs = reconstruction.map.discs()
-        self._discs = np.column_stack([world_points(discs[:, :2], self._drift), discs[:, 2]])
+        self._reconstruction.advance(at)
+        self._drift = self._reconstruction.drift(at)
+
+    @property
+    def unmet(self) -> Flags:
+        """Obstacles that no beam has met (N,)."""
+        return np.asarray(np.isinf(self._reconstruction.met))
+
+    @property
+    def hits(self) -> Floats:
+        """Hits of the occupancy map in the world (N, 3) [m]."""
+        discs = self._reconstruction.map.discs()
+        points = world_points(discs[:, :2], self._drift)
+        return np.column_stack([points, np.full(len(points), min(self._reconstruction.lidar.height, 0.3))])
 
     def to_world(self, points: Floats) -> Floats:
         """Transform points (N, 2) [m] from the robot's map to the world."""
         return world_points(points, self._drift)
 
-    def hatch_unknown(self, frame: Picture, backdrop: Backdrop, fine: int) -> None:
-        """Hatch unknown ground and fade undetected obstacles."""
-        seen, pixel = self._reconstruction.map, backdrop.camera.pixel
-        style = np.array([VEIL, LINES, HATCHING * pixel, pixel])
-        tints = np.array([PALE, HATCH], dtype=np.float64)
-        arrays, bounds, visible = seen.arrays, np.array(self._scene.bounds), backdrop.visible
-        ground = (arrays.free, arrays.occupied, arrays.frame)
-        kernels.veil(frame, visible, backdrop.inverse, bounds, self._drift, *ground, style, tints)
-        unmet = np.isinf(self._reconstruction.met)[self._around]
-        if unmet.any():
-            kernels.pale_bodies(frame, visible, backdrop.bodies, fine, unmet, tints[0], PALENESS)
-
-    def draw_hits(self, frame: Picture, backdrop: Backdrop) -> None:
-        """Draw the hits of the occupancy map over all bodies, at the height of the beams."""
-        camera = backdrop.camera
-        plane = camera.plane(min(self._reconstruction.lidar.height, 0.3))
-        places, radii = self._discs[:, :2], np.maximum(self._discs[:, 2], 1.1 * camera.pixel)
-        everywhere, colour = np.ones_like(backdrop.visible), np.array(HIT, dtype=np.float64)
-        rows = capsules(places, places, radii)
-        painting.blend_capsules(frame, everywhere, plane, np.linalg.inv(plane), rows, colour, 0.9)
+    def veil_unknown(self, painter: Painter) -> None:
+        """Veil unknown ground."""
+        arrays, (cos, sin, x, y) = self._reconstruction.map.arrays, self._drift.tolist()
+        left, low, cell = arrays.frame.tolist()
+        unknown = np.where(arrays.free | arrays.occupied, 0, VEIL).astype(np.uint8)
+        to_map = np.array([(cos, -sin, x - left), (sin, cos, y - low), (0.0, 0.0, cell)])
+        painter.lay(PALE, unknown, to_map, outside=VEIL, smooth=True)

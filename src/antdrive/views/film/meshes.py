@@ -1,17 +1,15 @@
-"""Meshes for films: cylinders, the kerb around the world, and a robot with turning wheels."""
+"""Meshes for films: cylinders, and a robot."""
 
 from __future__ import annotations
 
-import itertools
 import math
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
 
-from antdrive.base.types import Floats, Ints, Point
-from antdrive.robots.spec import Footprint, RobotSpec
-from antdrive.views.colours import SHELL, TURRET, WHITE, Colour
+from antdrive.base.types import Floats, Ints
+from antdrive.robots.spec import RobotSpec
+from antdrive.views.colours import INK, SHELL, TURRET, WHITE, Colour, mixed
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,10 +20,6 @@ class Mesh:
     normals: Floats  # unit vectors (V, 3)
     triangles: Ints  # vertex indices (T, 3), counter-clockwise from outside
 
-    def turned(self, turn: Floats) -> Mesh:
-        """Return the mesh turned by a matrix (3, 3)."""
-        return Mesh(self.vertices @ turn, self.normals @ turn, self.triangles)
-
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -33,8 +27,6 @@ class Part:
 
     mesh: Mesh
     colour: Colour
-    wheel: int = 0  # 1: turns with the left wheel; -1: with the right wheel; 0: fixed to the chassis
-    axle: tuple[float, float, float] = (0.0, 0.0, 0.0)  # origin on the chassis [m]
 
 
 def join(*meshes: Mesh) -> Mesh:
@@ -63,7 +55,10 @@ def cylinder(radius: float, low: float, high: float, *, sides: int = 48, x: floa
 
 
 def prism(outline: Floats, low: float, high: float, *, chamfer: float = 0.0) -> Mesh:
-    """Extrude a convex counter-clockwise outline (K, 2) from `low` to `high`, with a chamfered upper edge."""
+    """Extrude a counter-clockwise outline (K, 2) from `low` to `high`, with a chamfered upper edge.
+
+    It is convex, or whole in sight of its first point.
+    """
     count = len(outline)
     centre = outline.mean(axis=0)
     reach = np.hypot(*(outline - centre).T).max()
@@ -75,145 +70,31 @@ def prism(outline: Floats, low: float, high: float, *, chamfer: float = 0.0) -> 
     return join(*faces, top)
 
 
-def box(x0: float, y0: float, x1: float, y1: float, low: float, high: float) -> Mesh:
-    """Return an axis-aligned box without a bottom."""
-    return prism(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), low, high)
-
-
-def kerb(bounds: tuple[float, float, float, float], width: float, height: float) -> list[Mesh]:
-    """Return a low wall around the world in short pieces, with its inner faces on the bounds."""
-    x0, y0, x1, y1 = bounds
-    pieces = []
-    for low, high in pairwise(_cuts(x0 - width, x1 + width)):
-        pieces += [box(low, y0 - width, high, y0, 0, height), box(low, y1, high, y1 + width, 0, height)]
-    for low, high in pairwise(_cuts(y0, y1)):
-        pieces += [box(x0 - width, low, x0, high, 0, height), box(x1, low, x1 + width, high, 0, height)]
-    return pieces
-
-
-def _cuts(low: float, high: float) -> list[float]:
-    """Return the ends of at most 24 equal pieces."""
-    cuts: list[float] = np.linspace(low, high, min(24, math.ceil(high - low)) + 1).tolist()
-    return cuts
-
-
 def robot_height(body: RobotSpec) -> float:
     """Return the robot's drawn height [m], without a tall mast, which would hide the path."""
     return min(body.height, max(1.1 * body.footprint.radius, 2.4 * body.wheel_radius))
 
 
-def robot_parts(body: RobotSpec) -> tuple[Part, ...]:
+def robot_parts(body: RobotSpec, deck_colour: Colour = SHELL) -> tuple[Part, ...]:
     """Return the robot's parts, relative to the ground below the axle's centre, heading along +x.
 
-    The deck has the footprint's exact outline. On it are a turret, a white arrow and two lamps in front; the wheels
-    turn in wells.
+    The deck has the footprint's exact outline. On it are a turret and a white arrow.
     """
     foot, r = body.footprint, body.wheel_radius
     xmin, ymin, xmax, ymax = foot.bounds
-    length, width, middle_x, middle_y = (xmax - xmin) / 2, (ymax - ymin) / 2, (xmin + xmax) / 2, (ymin + ymax) / 2
-    size = min(length, width)
-    outline = _outline(foot)
-    half_track = body.track / 2
-    edge_y = half_track + foot.depth(0.0, half_track) if foot.corners else width
-    outside = math.sqrt(max(width**2 - r**2, 0.0)) if foot.is_disc else edge_y
-    tread = float(np.clip(2 * (outside - half_track), 0.35 * r, 0.9 * r))
-    well_x, well_y = 1.12 * r, half_track - 0.62 * tread
-    floor = 0.35 * r
-    deck = max(min(1.45 * r, 0.8 * robot_height(body)), floor + 0.3 * r)
-    edge = 0.12 * (deck - floor)
+    middle, half = np.array([(xmin + xmax) / 2, (ymin + ymax) / 2]), min(xmax - xmin, ymax - ymin) / 2
+    outline, low = np.array(foot.outline()), 0.3 * r
+    deck = max(min(1.45 * r, 0.8 * robot_height(body)), low + 0.3 * r)
     roof = max(robot_height(body), deck + 0.2 * r)
-    ahead, behind = min(well_x, 0.98 * xmax), max(-well_x, 0.98 * xmin)
-    front, rear = _cut(outline, 0, ahead), _cut(outline, 0, behind, keep_low=True)
-    middle = np.array([(behind, -well_y), (ahead, -well_y), (ahead, well_y), (behind, well_y)])
-    shell = [prism(front, floor, deck, chamfer=edge), prism(rear, floor, deck, chamfer=edge)]
-    shell.append(prism(middle, floor, deck))
-    back, core = middle_x - 0.08 * length, np.array([middle_x, middle_y])
-    smaller = (outline - core) * (0.60 if foot.is_disc else 0.66) + [back, middle_y]
-    turret = prism(smaller, deck, roof, chamfer=0.05 * size)
-    arrow = [replace(p, vertices=p.vertices + [0, middle_y, 0]) for p in _arrow(back, 0.50 * size, roof, 0.012 * size)]
-    lamps = _lamps(foot, (middle_x, middle_y), (length, width), deck)
-    parts = [Part(join(*shell), SHELL), Part(turret, TURRET), Part(join(*arrow, *lamps), WHITE)]
-    for side in (1, -1):
-        axle = (0.0, side * half_track, r)
-        tyre, marks = _wheel(r, tread, side)
-        parts += [Part(tyre, (30, 34, 42), side, axle), Part(marks, (236, 238, 242), side, axle)]
-    return tuple(parts)
-
-
-def _lamps(foot: Footprint, middle: Point, half: Point, deck: float) -> list[Mesh]:
-    """Return two lamps at the front of the deck: closer or farther back on a narrow front, none on a pointed one."""
-    (x, y), (length, width), size = middle, half, min(half)
-    for ahead, apart in itertools.product((0.90, 0.75, 0.6), (0.26, 0.18, 0.1)):
-        front, aside, wide = ahead * length, apart * width, 0.08 * size
-        if all(foot.depth(x + front, y + side * (aside + wide)) >= 0 for side in (-1, 1)):
-            return [
-                box(x + front - 0.1 * length, y + s - wide, x + front, y + s + wide, deck, deck + 0.05 * size)
-                for s in (-aside, aside)
-            ]
-    return []
-
-
-def _wheel(radius: float, tread: float, side: int) -> tuple[Mesh, Mesh]:
-    """Return a tyre about the y axis, and light lugs and spokes that show its rotation."""
-    upper = cylinder(radius, -tread / 2, tread / 2, sides=28)
-    flip = np.array([1.0, -1.0, -1.0])
-    drum = join(upper, Mesh(upper.vertices * flip, upper.normals * flip, upper.triangles))  # closed, about the z axis
-    tyre = drum.turned(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]))
-    lugs = []
-    for k in range(5):
-        angle = k * 2 * math.pi / 5
-        half = 0.16 * radius
-        bar = box(-half, -0.46 * tread, half, 0.46 * tread, 0.92 * radius, 1.03 * radius)
-        spoke_y = 0.5 * tread * side
-        thin = 0.06 * tread * side
-        lo, hi = sorted((spoke_y, spoke_y + thin))
-        spoke = box(-0.6 * half, lo, 0.6 * half, hi, 0.15 * radius, 0.86 * radius)
-        lugs += [_turned(bar, angle), _turned(spoke, angle)]
-    return tyre, join(*lugs)
-
-
-def _turned(mesh: Mesh, angle: float) -> Mesh:
-    """Turn a mesh about the y axis by an angle [rad]."""
-    c, s = math.cos(angle), math.sin(angle)
-    return mesh.turned(np.array([[c, 0, -s], [0, 1.0, 0], [s, 0, c]]))
-
-
-def _arrow(x: float, reach: float, low: float, thin: float) -> list[Mesh]:
-    """Return a chevron that points along +x."""
-    tip, tail, wide, notch = x + 0.95 * reach, x - 0.75 * reach, 0.72 * reach, x - 0.30 * reach
-    return [
-        prism(np.array([(tip, 0.0), (tail, wide), (notch, 0.0)]), low, low + thin),
-        prism(np.array([(tip, 0.0), (notch, 0.0), (tail, -wide)]), low, low + thin),
-    ]
-
-
-def _outline(foot: Footprint) -> Floats:
-    """Return a footprint's outline (K, 2), counter-clockwise."""
-    steps = 16  # of each corner
-    if foot.corners:
-        return np.array(foot.outline(steps))
-    corner = max(foot.rounding, 0.0)
-    points = []
-    for k, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
-        x, y = sx * foot.half_length, sy * foot.half_width
-        for angle in np.linspace(k * math.pi / 2, (k + 1) * math.pi / 2, steps if corner > 0 else 1, endpoint=False):
-            points.append((x + corner * math.cos(angle), y + corner * math.sin(angle)))
-    return np.array(points)
-
-
-def _cut(outline: Floats, axis: int, at: float, *, keep_low: bool = False) -> Floats:
-    """Return the part of a convex outline (K, 2) with coordinate `axis` above `at`, or below it with `keep_low`."""
-    sign = -1.0 if keep_low else 1.0
-    inside = sign * (outline[:, axis] - at) >= 0
-    points = []
-    for i, point in enumerate(outline):
-        following = outline[(i + 1) % len(outline)]
-        if inside[i]:
-            points.append(point)
-        if inside[i] != inside[(i + 1) % len(outline)]:
-            part = (at - point[axis]) / (following[axis] - point[axis])
-            points.append(point + part * (following - point))
-    return np.array(points)
+    back = middle[0] - 0.04 * (xmax - xmin)
+    smaller = (outline - middle) * (0.60 if foot.is_disc else 0.66) + [back, middle[1]]
+    arrow = [back, middle[1]] + 0.5 * half * np.array([(0.95, 0.0), (-0.75, 0.72), (-0.30, 0.0), (-0.75, -0.72)])
+    top = TURRET if deck_colour == SHELL else mixed(deck_colour, INK, 0.3)
+    return (
+        Part(prism(outline, low, deck, chamfer=0.12 * (deck - low)), deck_colour),
+        Part(prism(smaller, deck, roof, chamfer=0.05 * half), top),
+        Part(prism(arrow, roof, 1.01 * roof), WHITE),
+    )
 
 
 def _band(low: tuple[Floats, float], high: tuple[Floats, float]) -> Mesh:

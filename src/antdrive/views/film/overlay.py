@@ -1,8 +1,9 @@
-"""Text over a film's picture: a band of names and numbers below it, the legend, and the outcome at the end."""
+"""Text of a film: a band of names, numbers and the legend above the picture, and the outcome at the end."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -12,24 +13,24 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.views import colours
 from antdrive.views.film.camera import Picture
 from antdrive.views.film.playback import SLOW_MOTION
-from antdrive.views.film.text import Sprite, fitted, font, pill, plate, put, text_width, wrapped
+from antdrive.views.film.text import Sprite, fitted, font, pill, put, text_width, wrapped
 from antdrive.views.scene import Scene
+
+EDGE = (210, 216, 225)  # below the band
 
 DRIVING = ("DRIVING", colours.CALM)
 PLANNING = ("PLANNING", colours.CALM)
+ENDED = ("END", colours.CALM)
 SLOWED = (f"SLOW ×1/{SLOW_MOTION:g}", colours.BAD)
 
 #: Names of the band's four numbers during drive and planning.
 DRIVE_FIELDS = ("TIME", "SPEED", "CLEARANCE", "MINIMUM")
-PLAN_FIELDS = ("ITERATION", "BEST PATH", "MEAN PATH", "ARRIVED")
+PLAN_FIELDS = ("ITERATION", "BEST SO FAR", "FOUND AT", "ARRIVED")
 
-#: Heights of a legend row in the band and of its edge [units].
-LEGEND_ROW, LEGEND_EDGE = 1.5, 0.4
-
-#: Notes below the numbers: line height [units], largest number of lines, font size [units].
-NOTE_LINE, MOST_NOTES, NOTE_FONT = 1.2, 3, 0.86
-#: Largest fraction of a picture's height that the band takes.
-MOST_BAND = 0.34
+#: Heights of a row of the legend, of its edge, of a drive's row and of a line of the note [units].
+LEGEND_ROW, LEGEND_EDGE, DRIVE_ROW, NOTE_LINE = 1.5, 0.4, 1.6, 1.2
+MOST_NOTES = 3  # lines of a note
+MOST_BAND = 0.34  # largest fraction of a picture's height that the band takes
 #: Reasons below the outcome: largest number of lines, font size [units].
 MOST_REASONS, REASON_FONT = 4, 1.05
 
@@ -46,30 +47,54 @@ def drive_values(time: float, speed: float, clearance: float, least: float) -> V
     ]
 
 
+class LegendEntry(NamedTuple):
+    """Entry of the legend."""
+
+    kind: str  # of the sample: `line`, `dash`, `dot`, `ring` or `area`
+    colour: colours.Colour  # of the sample
+    text: str  # its meaning
+
+
 @dataclass(frozen=True)
 class Layout:
-    """Sizes of text and band in a frame."""
+    """Sizes of text and band in a frame, and the lines that fit."""
 
     width: int  # of the frame [px]
     unit: int  # height of small text [px]
-    wide: bool  # whether names, numbers and outcome stand side by side
-    rows: int  # legend rows in the band; 0: the legend is a card in the picture's corner
-    height: int  # of the band [px]
-    note: tuple[str, ...] = ()  # lines of a note too long for the space beside the numbers
+    wide: bool  # whether names and numbers stand side by side
+    note: tuple[str, ...] = ()  # its lines
+    drives: int = 0  # rows of drives
+    legend: tuple[tuple[LegendEntry, ...], ...] = ()  # its rows
 
     @classmethod
-    def of(cls, size: tuple[int, int], rows: int, note: str = "") -> Layout:
-        """Return the layout of a frame of a size (width, height) [px] with legend rows and a note."""
+    def of(
+        cls, size: tuple[int, int], *, note: str = "", drives: int = 0, entries: Sequence[LegendEntry] = ()
+    ) -> Layout:
+        """Return the layout of a frame of a size (width, height) [px]; the last lines that do not fit are omitted."""
         width, height = size
         wide = width >= 1.5 * height and width >= 900
-        unit = max(8, round(min(height / 46, width / (82 if wide else 56))))
-        plain = cls(width, unit, wide, rows, 0)
-        most = min(MOST_NOTES, int((MOST_BAND * height / unit - plain.numbers_units) / NOTE_LINE))
-        lines: list[str] = []
-        if most > 0 and text_width(note, plain.small, True) > plain.note_room:
-            lines = wrapped(note, width - 2 * unit, plain.small, True, most=most)
-        units = plain.numbers_units + NOTE_LINE * len(lines) + (LEGEND_EDGE + LEGEND_ROW * rows if rows else 0.0)
-        return cls(width, unit, wide, rows, 2 * round(units * unit / 2), tuple(lines))
+        plain = cls(width, max(8, round(min(height / 46, width / (82 if wide else 56)))), wide, drives=drives)
+        room = (MOST_BAND * height - plain.height) / plain.unit
+        most = min(MOST_NOTES, int(room / NOTE_LINE))
+        lines = wrapped(note, width - 2 * plain.unit, plain.small, True, most=most) if most > 0 else []
+        rows = plain.rows_of(entries)[: max(1, int((room - NOTE_LINE * len(lines) - LEGEND_EDGE) / LEGEND_ROW))]
+        return replace(plain, note=tuple(lines), legend=tuple(rows))
+
+    def rows_of(self, entries: Sequence[LegendEntry]) -> list[tuple[LegendEntry, ...]]:
+        """Arrange entries of the legend in rows."""
+        rows: list[tuple[LegendEntry, ...]] = []
+        left = 0.0
+        for entry in entries:
+            wide = self.width_of(entry)
+            if not rows or wide > left:
+                rows, left = [*rows, ()], self.width - self.unit
+            rows[-1] += (entry,)
+            left -= wide
+        return rows
+
+    def width_of(self, entry: LegendEntry) -> float:
+        """Return the width of an entry of the legend, with the space behind it [px]."""
+        return 3.4 * self.small + text_width(entry.text, self.small)
 
     @property
     def numbers_units(self) -> float:
@@ -77,80 +102,91 @@ class Layout:
         return 4.7 if self.wide else 7.8
 
     @property
+    def height(self) -> int:
+        """Height of the band [px]."""
+        units = self.numbers_units + NOTE_LINE * len(self.note) + DRIVE_ROW * self.drives
+        units += LEGEND_EDGE + LEGEND_ROW * len(self.legend) if self.legend else 0.0
+        return 2 * round(units * self.unit / 2)
+
+    @property
     def small(self) -> int:
-        """Font size of a note [px]."""
-        return round(NOTE_FONT * self.unit)
-
-    @property
-    def fields(self) -> tuple[int, int]:
-        """Left edge of the first of the four numbers, and spacing of the numbers [px]."""
-        pad = self.unit
-        return (round(0.36 * self.width), 8 * self.unit) if self.wide else (pad, (self.width - pad) // 4)
-
-    @property
-    def note_room(self) -> int:
-        """Space for a note beside the numbers [px]."""
-        first, column = self.fields
-        return self.width - first - 4 * column - self.unit if self.wide else self.width // 2
+        """Font size of notes and legend [px]."""
+        return max(8, round(0.86 * self.unit))
 
 
 class Band:
-    """Band below the picture. Its constant content is drawn once, numbers and status when they change."""
+    """Band above the picture. Its constant content is drawn once, numbers and status when they change."""
 
     def __init__(
-        self,
-        layout: Layout,
-        title: str,
-        subtitle: str,
-        note: str | None,
-        legend: LegendRows,
-        names: tuple[str, ...] = DRIVE_FIELDS,
+        self, layout: Layout, title: str, subtitle: str, corner: str, names: tuple[str, ...] = DRIVE_FIELDS
     ) -> None:
         self.layout = layout
         unit, width, wide = layout.unit, layout.width, layout.wide
         self._blank = Image.new("RGB", (width, layout.height), colours.BAND)
-        draw = ImageDraw.Draw(self._blank)
-        draw.line([(0, 0), (width, 0)], fill=(210, 216, 225), width=max(1, unit // 8))
-        pad, big, small = unit, round(1.35 * unit), layout.small
-        numbers, column = layout.fields
-        self._fields = [(numbers + k * column, round((0.75 if wide else 4.25) * unit)) for k in range(4)]
-        shown = "" if layout.note else fitted(note or "", layout.note_room, small, True)
-        room = numbers - 2 * pad if wide else width - _widest_status(unit) - 3 * pad
-        subroom = room if wide else width - text_width(shown, small, True) - 3 * pad
-        draw.text((pad, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=colours.INK)
-        draw.text((pad, 2.45 * unit), fitted(subtitle, subroom, unit), font=font(unit), fill=colours.MUTED)
-        draw.text(
-            (width - pad, (3.75 if wide else 3.3) * unit), shown, font=font(small, True), fill=colours.CALM, anchor="rm"
-        )
+        draw, small = ImageDraw.Draw(self._blank), font(layout.small)
+        draw.line([(0, layout.height - 1), (width, layout.height - 1)], fill=EDGE, width=max(1, unit // 8))
+        first, column = (round(0.33 * width), round(7.6 * unit)) if wide else (unit, (width - unit) // 4)
+        self._fields = [(first + k * column, round((0.75 if wide else 4.25) * unit)) for k in range(len(names))]
+        room = first - 2 * unit if wide else width // 2
+        big = round(1.35 * unit)
+        draw.text((unit, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=colours.INK)
+        draw.text((unit, 2.45 * unit), fitted(subtitle, room, unit), font=font(unit), fill=colours.MUTED)
+        draw.text((width - unit, 3.2 * unit), corner, font=small, fill=colours.MUTED, anchor="rm")
         for k, line in enumerate(layout.note):
-            middle = (layout.numbers_units - 0.1 + (k + 0.5) * NOTE_LINE) * unit
-            draw.text((pad, middle), line, font=font(small, True), fill=colours.CALM, anchor="lm")
+            middle: float = (layout.numbers_units - 0.1 + (k + 0.5) * NOTE_LINE) * unit
+            draw.text((unit, middle), line, font=font(layout.small, True), fill=colours.CALM, anchor="lm")
         for (x, y), name in zip(self._fields, names, strict=True):
             draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=colours.MUTED)
-        if layout.rows:
-            _draw_rows(draw, legend, layout)
-        self._shown: tuple[Values, tuple[str, colours.Colour]] | None = None
+        top = layout.height - LEGEND_ROW * len(layout.legend) * unit - 0.25 * unit
+        for number, row in enumerate(layout.legend):
+            left, middle = float(unit), top + (number + 0.5) * LEGEND_ROW * unit
+            for entry in row:
+                _draw_sample(draw, entry, left, middle, layout.small)
+                draw.text((left + 2.0 * layout.small, middle), entry.text, font=small, fill=colours.INK, anchor="lm")
+                left += layout.width_of(entry)
+        self._shown: tuple[Values, tuple[str, colours.Colour], Sequence[DriveRow]] | None = None
         self._picture = np.array(self._blank)
 
-    def draw(self, values: Values, status: tuple[str, colours.Colour], out: Picture) -> None:
-        """Draw the band of one frame into `out` (h, W, 3), with its four numbers and its status."""
-        if (values, status) != self._shown:
-            self._shown = values, status
+    def draw(
+        self, values: Values, status: tuple[str, colours.Colour], out: Picture, drives: Sequence[DriveRow] = ()
+    ) -> None:
+        """Draw the band of one frame into `out` (h, W, 3), with its numbers, its status and a row per drive."""
+        if (values, status, drives) != self._shown:
+            self._shown = values, status, drives
             image, unit = self._blank.copy(), self.layout.unit
             draw, large = ImageDraw.Draw(image), font(round(1.4 * unit), True)
             for (x, y), (text, bad) in zip(self._fields, values, strict=True):
                 draw.text((x, y + 1.15 * unit), text, font=large, fill=colours.BAD if bad else colours.INK)
+            for k, row in enumerate(drives):
+                _draw_drive(draw, row, self.layout, k)
             self._picture, label = np.array(image), pill(status[0], round(1.08 * unit), status[1])
             put(self._picture, label, self.layout.width - unit - label.shape[1], 0.5 * unit)
         out[:] = self._picture
 
 
-def _widest_status(unit: int) -> int:
-    size = round(1.08 * unit)
-    widest = max(
-        text_width(text, size, True) for text, _ in (*colours.OUTCOME_LABELS.values(), DRIVING, PLANNING, SLOWED)
-    )
-    return widest + 2 * round(0.75 * size)
+class DriveRow(NamedTuple):
+    """Row of the band about one of several drives."""
+
+    names: str  # its planners
+    colour: colours.Colour
+    facts: tuple[str, ...]  # from the most important one
+    verdict: tuple[str, colours.Colour] | None = None  # once it has ended
+
+
+def _draw_drive(draw: ImageDraw.ImageDraw, row: DriveRow, layout: Layout, number: int) -> None:
+    """Draw a drive's row below the numbers."""
+    unit, width, size = layout.unit, layout.width, round(0.95 * layout.unit)
+    middle = (layout.numbers_units + NOTE_LINE * len(layout.note) + DRIVE_ROW * (number + 0.3)) * unit
+    draw.rounded_rectangle((unit, middle - 0.3 * unit, 3 * unit, middle + 0.3 * unit), 0.3 * unit, fill=row.colour)
+    first, last = round(0.2 * width), width - unit
+    names = fitted(row.names, round(first - 4 * unit), size, True)
+    draw.text((3.6 * unit, middle), names, font=font(size, True), fill=colours.INK, anchor="lm")
+    if row.verdict is not None:
+        verdict = fitted(row.verdict[0], round(0.6 * width), size, True)
+        draw.text((last, middle), verdict, font=font(size, True), fill=row.verdict[1], anchor="rm")
+        last -= text_width(verdict, size, True) + unit
+    facts = fitted("    ".join(row.facts), last - first, size)
+    draw.text((first, middle), facts, font=font(size), fill=colours.MUTED, anchor="lm")
 
 
 def _metres(value: float) -> str:
@@ -159,166 +195,60 @@ def _metres(value: float) -> str:
     return f"{value + 0.0 if abs(value) >= 5e-4 else 0.0:.3f} m"
 
 
-#: Legend of the grey band around obstacles.
-NO_GO = "no-go area for the robot's centre (radius + margin)"
-NO_GO_OUTLINED = "no-go area for the footprint (margin)"
-
-_WIDE_KINDS = ("ramp", "field", "line", "dash", "zone", "hatch")
-
-
-class LegendEntry(NamedTuple):
-    """Line of the legend."""
-
-    kind: str  # of the sample: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot`, `halo` or `scale`
-    colour: colours.Colour  # of the sample
-    text: str  # its meaning
-    width: float = 0.0  # of a scale bar [px]
-
-
 def legend_entries(
     scene: Scene,
-    step: float,
-    pixel: float,
     *,
-    planning: bool = False,
+    field: str = "",
+    limiters: Sequence[tuple[colours.Colour, str]] = (),
+    route: bool = True,
     replans: bool = False,
     beams: bool = False,
     own_map: bool = False,
     tracked: bool = False,
-    glow: bool = False,
-    routed: bool = True,
 ) -> list[LegendEntry]:
-    """Return the legend's entries, one for each kind of object in the picture."""
-    if planning:
-        entries = [
-            LegendEntry("field", colours.INK, "planner's field"),
-            LegendEntry("line", colours.SHELL, "best path so far"),
-        ]
-    else:
-        speeds = f"speed, 0 to {scene.robot.max_speed:.3g} m/s"
-        entries = [LegendEntry("ramp", colours.INK, speeds)]
-        entries += [LegendEntry("dash", colours.ROUTE, "planned route")] if routed else []
-    if glow:
-        entries.append(LegendEntry("halo", colours.SHELL, "robot"))
-    if replans:
-        entries.append(LegendEntry("dot", colours.ROUTE, "replan"))
-    if scene.has_no_go_area:
-        entries.append(LegendEntry("zone", colours.ZONE, NO_GO_OUTLINED if scene.outlined else NO_GO))
-    if scene.unseen.any():
-        entries.append(LegendEntry("dot", colours.UNSEEN, scene.unseen_label))
-    if beams:
-        entries.append(LegendEntry("zone", colours.BEAM, "lidar beams"))
-    if own_map:
-        entries += [
-            LegendEntry("dot", colours.HIT, "lidar hit on the occupancy map"),
-            LegendEntry("hatch", colours.HATCH, "unknown ground"),
-        ]
-    if scene.mover_radii:
-        entries.append(LegendEntry("dot", colours.MOVER, "mover" if tracked else "mover, next 1.5 s"))
-    if tracked:
-        entries.append(LegendEntry("line", colours.TRACKED, "mover tracked by lidar, next 1.5 s"))
-    return [*entries, LegendEntry("scale", colours.INK, f"{step:g} m (grid)", step / pixel)]
+    """Return the legend's entries, one for each kind of object in the picture.
 
-
-def legend_card(entries: list[LegendEntry], layout: Layout) -> Sprite:
-    """Draw the legend as a card for the picture's corner."""
-    size = max(8, round(0.9 * layout.unit))
-    line, pad = round(1.55 * size), round(0.8 * size)
-    key = round(max(2.6 * size, *(entry.width for entry in entries)))
-    wide = 2 * pad + key + size // 2 + max(text_width(entry.text, size) for entry in entries)
-    image = plate(wide, 2 * pad + line * len(entries), (255, 255, 255), 222, radius=size // 2)
-    draw = ImageDraw.Draw(image)
-    for k, entry in enumerate(entries):
-        middle = pad + line * k + line / 2
-        _draw_sample(draw, entry, pad, middle, key, size)
-        draw.text((pad + key + size // 2, middle), entry.text, font=font(size), fill=colours.INK, anchor="lm")
-    return np.array(image)
-
-
-class LegendRows(NamedTuple):
-    """Legend entries in rows of the band."""
-
-    size: int  # of the text [px]
-    rows: list[list[LegendEntry]]  # the entries of each row, from the left
-    whole: bool  # whether every entry fits
-
-
-def legend_rows(entries: list[LegendEntry], layout: Layout) -> LegendRows:
-    """Arrange the entries in the layout's rows, in the largest text that fits.
-
-    In a picture too small for all entries the last ones are omitted.
+    `field` is the name of a planner's field, if planning is shown; `limiters` are colours and names.
     """
-    legend = LegendRows(0, [], False)
-    for size in range(max(8, round(0.9 * layout.unit)), max(7, round(0.75 * layout.unit)) - 1, -1):
-        room = float(layout.width - 2 * layout.unit)
-        rows: list[list[LegendEntry]] = [[]] if layout.rows else []
-        left = room
-        for entry in entries:
-            wide = sum(_entry_width(entry, size))
-            if rows and rows[-1] and wide > left:
-                rows.append([])
-                left = room
-            if rows:
-                rows[-1].append(entry)
-            left -= wide + size
-        legend = LegendRows(size, rows[: layout.rows], len(rows) <= layout.rows)
-        if legend.whole:
-            break
-    return legend
+    if field:
+        entries = [LegendEntry("area", colours.FIELD_STOPS[-1], field)]
+        entries += [LegendEntry("line", colours.SHELL, "best path so far")] if route else []
+    else:
+        entries = [LegendEntry("line", tint, f"speed: {name}") for tint, name in limiters]
+        entries += [LegendEntry("dash", colours.ROUTE, "planned route")] if route else []
+    mover = "mover" if tracked else "mover, next 1.5 s"
+    further = (
+        (replans, "ring", colours.ROUTE, "replan"),
+        (scene.has_no_go_area, "area", colours.ZONE, scene.no_go_label.replace("\n", " ")),
+        (scene.unseen.any(), "dot", colours.UNSEEN, scene.unseen_label),
+        (beams, "area", colours.BEAM, "lidar beams"),
+        (own_map, "dot", colours.HIT, "lidar hit on the occupancy map"),
+        (own_map, "area", colours.HATCH, "unknown ground"),
+        (scene.mover_radii, "dot", colours.MOVER, mover),
+        (tracked, "line", colours.TRACKED, "mover tracked by lidar, next 1.5 s"),
+    )
+    return entries + [LegendEntry(kind, colour, text) for shown, kind, colour, text in further if shown]
 
 
-def _entry_width(entry: LegendEntry, size: int) -> tuple[float, float]:
-    """Return the widths of an entry's sample and of its text with leading space, for a text size [px]."""
-    sample = round(entry.width or (2.2 if entry.kind in _WIDE_KINDS else 1.0) * size)
-    return sample, 0.5 * size + text_width(entry.text, size)
+def limiter_tints(names: Sequence[str]) -> list[colours.Colour]:
+    """Return a colour of the path under each speed-limiting rule; of the first, top speed, a muted one."""
+    tints = [colours.LIMITER_COLOURS[k % len(colours.LIMITER_COLOURS)] for k in range(1, len(names))]
+    return [colours.CRUISE, *((int(tint[1:3], 16), int(tint[3:5], 16), int(tint[5:], 16)) for tint in tints)]
 
 
-def _draw_rows(draw: ImageDraw.ImageDraw, legend: LegendRows, layout: Layout) -> None:
-    """Draw the legend as the last rows of a band."""
-    unit, size = layout.unit, legend.size
-    top = layout.height - (LEGEND_EDGE + LEGEND_ROW * layout.rows - 0.05) * unit
-    draw.line([(unit, top - 0.25 * unit), (layout.width - unit, top - 0.25 * unit)], fill=(226, 230, 237))
-    for number, row in enumerate(legend.rows):
-        widths = [_entry_width(entry, size) for entry in row]
-        gap = (layout.width - 2 * unit - sum(map(sum, widths))) / max(1, len(row) - 1)
-        x, middle = float(unit), top + (number + 0.5) * LEGEND_ROW * unit
-        for entry, (sample, text) in zip(row, widths, strict=True):
-            _draw_sample(draw, entry, round(x), middle, round(sample), size)
-            draw.text((x + sample + 0.5 * size, middle), entry.text, font=font(size), fill=colours.INK, anchor="lm")
-            x += sample + text + min(gap, 2.5 * size)
-
-
-def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float, wide: int, size: int) -> None:
-    """Draw the sample of a legend entry, `wide` pixels wide, beside text of height `size`."""
-    kind, colour = entry.kind, entry.colour
-    r = 0.42 * size
-    if kind in ("ramp", "field"):
-        tints = colours.speed_colours if kind == "ramp" else colours.field_colours
-        for i, tint in enumerate(tints(np.linspace(0, 1, wide))):
-            draw.line([(x + i, y - 0.22 * size), (x + i, y + 0.22 * size)], fill=tuple(int(c) for c in tint))
-    elif kind == "dash":
-        for start in np.arange(x, x + wide - 1, wide / 3):
-            draw.line([(start, y), (start + wide / 5, y)], fill=colour, width=max(2, size // 6))
-    elif kind == "line":
-        draw.line([(x, y), (x + wide, y)], fill=colour, width=max(2, size // 5))
-    elif kind == "zone":
-        pale = tuple(round(238 + (c - 238) * 0.3) for c in colour)
-        draw.rounded_rectangle((x, y - 0.4 * size, x + wide, y + 0.4 * size), size // 4, fill=pale, outline=colour)
-    elif kind == "hatch":
-        high = round(0.4 * size)
-        draw.rectangle((x, y - high, x + wide, y + high), fill=colours.PALE)
-        for at in range(x + high, x + wide - high, max(4, size // 2)):
-            draw.line([(at - high, y + high), (at + high, y - high)], fill=colour, width=max(1, size // 9))
-    elif kind == "dot":
-        draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=colour)
-    elif kind == "halo":
-        pale = tuple(round(255 + (c - 255) * 0.16) for c in colour)
-        draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=pale, outline=colour)
-    else:  # a scale bar
-        line = max(1, size // 7)
-        draw.line([(x, y), (x + entry.width, y)], fill=colour, width=line)
-        for end in (x, x + entry.width):
-            draw.line([(end, y - 0.35 * size), (end, y + 0.35 * size)], fill=colour, width=line)
+def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: float, y: float, size: int) -> None:
+    """Draw the sample of a legend entry beside text of height `size`."""
+    kind, colour, wide, r = entry.kind, entry.colour, 1.6 * size, 0.42 * size
+    if kind in ("line", "dash"):
+        starts, part = ((0.0, 0.4, 0.8), 0.2) if kind == "dash" else ((0.0,), 1.0)
+        for start in (x + share * wide for share in starts):
+            draw.line([(start, y), (start + part * wide, y)], fill=colour, width=max(2, round(0.22 * size)))
+    elif kind == "area":
+        pale = colours.mixed(colours.WHITE, colour, 0.4)
+        draw.rounded_rectangle((x, y - r, x + wide, y + r), size // 4, fill=pale, outline=colour)
+    else:
+        place, inside = (x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), kind == "ring"
+        draw.ellipse(place, fill=colours.WHITE if inside else colour, outline=colour, width=max(2, size // 5))
 
 
 def banner(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +19,10 @@ from antdrive.planners import Iteration, Query, as_iterative
 from antdrive.planners.iterative import without_iterations
 from antdrive.planners.registry import recorded_planner
 from antdrive.sim.log.rollout import Rollout
+from antdrive.views.colours import INK, shown_field
 from antdrive.views.film.camera import Picture
-from antdrive.views.film.overlay import Values
+from antdrive.views.film.film_options import FilmOptions
+from antdrive.views.film.overlay import DriveRow
 from antdrive.views.film.shot import Shot
 from antdrive.worlds import Grid, rasterise
 
@@ -61,38 +63,64 @@ class PlanningStage(NamedTuple):
 
     number: int  # iterations so far
     total: int  # maximum number of iterations
+    found: int  # iteration of the best path so far
     state: Iteration  # the last of them
     grid: Grid  # the planner's grid
     levels: Floats  # the field (R, C), as `field_levels`
     path: Floats  # the best path so far (N, 2) [m]
 
+    @property
+    def best(self) -> str:
+        """Length of the best path so far as text."""
+        return f"{self.state.best:.2f} m" if math.isfinite(self.state.best) else "—"
+
 
 def planning_stages(rollout: Rollout, count: int) -> Iterator[PlanningStage]:
     """Yield `count` stages of a run's planning, from the first to the last iteration."""
     grid, total, states = plan_again(rollout)
-    number, state = 1, next(states)
+    number, state, found = 1, next(states), 1
     for k in range(count):
         due = math.ceil((k + 1) * total / count)
         for later in itertools.islice(states, due - number):
-            number, state = number + 1, later
+            number, found = number + 1, number + 1 if later.best < state.best else found
+            state = later
         assert state.field is not None
         path = grid.xy(state.cells if state.waypoints is None else state.waypoints)
-        yield PlanningStage(number, total, state, grid, field_levels(grid, state.field), path)
+        yield PlanningStage(number, total, found, state, grid, field_levels(grid, state.field), path)
     if not np.array_equal(state.cells, rollout.cells):
         raise InputError("prelude: planning again gave another path; the log is from another version or machine")
 
 
-def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> Iterator[Picture]:
-    """Yield frames of a run's planning, from the first to the last iteration."""
-    still = {**setting, "camera": still_camera(setting["camera"])}
-    shot = Shot(rollout, **still, planning=True)
-    for one in planning_stages(rollout, count):
-        yield shot.planning_frame(_values(one.number, one.total, one.state), one.grid, one.levels, one.path)
+def planning_frames(
+    rollouts: Rollout | Mapping[str, Rollout], setting: Mapping[str, Any], count: int
+) -> Iterator[Picture]:
+    """Yield frames of planning, from the first to the last iteration; of several runs, the field of the first that has one."""
+    several = not isinstance(rollouts, Rollout)
+    camera = FilmOptions(**setting).checked(several=several).camera
+    shot = Shot(rollouts, **{**setting, "camera": "oblique" if camera == "follow" else camera}, planning=True)
+    drives = shot.drives
+    shown = {k: next(filter(has_field, drive.logs), None) for k, drive in enumerate(drives)}
+    at_work = {k: planning_stages(log, count) for k, log in shown.items() if log is not None}
+    for stages in zip(*at_work.values(), strict=True):
+        stage_of, first = dict(zip(at_work, stages, strict=True)), stages[0]
+        paths = [stage_of[k].path if k in stage_of else drive.rollout.route for k, drive in enumerate(drives)]
+        found = "—" if first.best == "—" else str(first.found)
+        values = f"{first.number} / {first.total}", first.best, found, str(first.state.arrived)
+        rows = [
+            DriveRow(drive.names, drive.colour or INK, _facts(stage_of.get(k), drive.planned))
+            for k, drive in enumerate(drives)
+        ]
+        if several:
+            yield shot.planning_frame([], first.grid, first.levels, paths, rows)
+        else:
+            yield shot.planning_frame([(value, False) for value in values], first.grid, first.levels, paths)
 
 
-def still_camera(camera: str) -> str:
-    """Return the camera that shows planning before a drive shown by `camera`."""
-    return "oblique" if camera == "follow" else camera
+def _facts(stage: PlanningStage | None, planned: str) -> tuple[str, ...]:
+    """Return the facts of a planner's row."""
+    if stage is None:
+        return (f"planned {planned} m",)
+    return f"iteration {stage.number} of {stage.total}", f"best {stage.best}, found at {stage.found}"
 
 
 def field_levels(grid: Grid, field: Floats) -> Floats:
@@ -100,23 +128,8 @@ def field_levels(grid: Grid, field: Floats) -> Floats:
 
     The square root keeps weak trails visible beside strong ones.
     """
-    values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return values
-    low, high = np.quantile(finite, (0.02, 0.998))
-    return np.asarray(np.sqrt(np.clip((values - low) / max(high - low, 1e-300), 0.0, 1.0)))
-
-
-def _values(number: int, total: int, state: Iteration) -> Values:
-    """Format the band's numbers, named by `PLAN_FIELDS`."""
-
-    def metres(value: float) -> str:
-        return f"{value:.2f} m" if math.isfinite(value) else "—"
-
-    return [
-        (f"{number} / {total}", False),
-        (metres(state.best), False),
-        (metres(state.iteration_mean), False),
-        (str(state.arrived), False),
-    ]
+    found = shown_field(grid, field)
+    if found is None:
+        return np.where(grid.free, 0.0, np.nan)
+    values, low, high = found
+    return np.asarray(np.sqrt(np.clip((values - low) / (high - low), 0.0, 1.0)))

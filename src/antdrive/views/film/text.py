@@ -58,12 +58,12 @@ def wrapped(text: str, width: int, size: int, bold: bool = False, *, most: int) 
 
 def label(text: str, size: int, colour: Colour) -> Sprite:
     """Return a text with a soft white rim, legible on any background."""
-    rim = max(2, size // 7)
+    rim = max(3, size // 4)
     wide, high = text_width(text, size, True) + 2 * rim, round(1.25 * size) + 2 * rim
     image = Image.new("RGBA", (wide, high), (255, 255, 255, 0))
     draw = ImageDraw.Draw(image)
     draw.text(
-        (rim, rim), text, font=font(size, True), fill=colour, stroke_width=rim - 1, stroke_fill=(255, 255, 255, 215)
+        (rim, rim), text, font=font(size, True), fill=colour, stroke_width=rim - 1, stroke_fill=(255, 255, 255, 235)
     )
     draw.text((rim, rim), text, font=font(size, True), fill=colour)
     return np.asarray(image)
@@ -82,51 +82,16 @@ def pill(text: str, size: int, colour: Colour, more: Sequence[str] = (), small: 
     pad_x, pad_y, line = round(0.75 * size), round(0.36 * size), round(1.35 * small)
     wide = max(text_width(text, size, True), *(text_width(row, small) for row in more), 0) + 2 * pad_x
     head = round(1.2 * size) + 2 * pad_y
-    image = plate(wide, head + line * len(more), colour, 255, radius=head // 2)
+    tall, fine = head + line * len(more), 4
+    mask = Image.new("L", (fine * wide, fine * tall), 0)
+    place = (0, 0, fine * wide - 1, fine * tall - 1)
+    ImageDraw.Draw(mask).rounded_rectangle(place, radius=fine * (head // 2), fill=255)
+    image = Image.new("RGBA", (wide, tall), (*colour, 0))
+    image.putalpha(mask.reduce(fine))
     draw = ImageDraw.Draw(image)
     draw.text((wide / 2, head / 2), text, font=font(size, True), fill=(255, 255, 255, 255), anchor="mm")
     for k, row in enumerate(more):
-        place = wide / 2, head - pad_y + (k + 0.5) * line
-        draw.text(place, row, font=font(small), fill=(255, 255, 255, 255), anchor="mm")
+        draw.text(
+            (wide / 2, head - pad_y + (k + 0.5) * line), row, font=font(small), fill=(255, 255, 255, 255), anchor="mm"
+        )
     return np.asarray(image)
-
-
-def plate(width: int, height: int, colour: Colour, alpha: int, *, radius: int) -> Image.Image:
-    """Return a rectangle with smooth round corners on a transparent background."""
-    fine = 4
-    mask = Image.new("L", (width * fine, height * fine), 0)
-    box = (0, 0, width * fine - 1, height * fine - 1)
-    ImageDraw.Draw(mask).rounded_rectangle(box, radius=radius * fine, fill=alpha)
-    image = Image.new("RGBA", (width, height), (*colour, 0))
-    image.putalpha(mask.reduce(fine))
-    return image
-
-
-def burst(size: int, colour: Colour) -> Sprite:
-    """Return the mark of a contact: a ring with rays."""
-    fine = 4
-    wide = size * fine
-    image = Image.new("RGBA", (wide, wide), (*colour, 0))
-    draw = ImageDraw.Draw(image)
-    middle, reach = wide / 2, wide / 2 - fine
-    for rim, fill in ((0.20, (255, 255, 255, 235)), (0.12, (*colour, 255))):
-        for k in range(8):
-            angle = (k + 0.5) * np.pi / 4
-            ray = np.array([np.cos(angle), np.sin(angle)])
-            a, b = middle + 0.66 * reach * ray, middle + (0.99 if rim < 0.2 else 1.0) * reach * ray
-            draw.line([tuple(a), tuple(b)], fill=fill, width=max(1, round(rim * reach)))
-        r, line = 0.52 * reach + rim * reach / 2, max(1, round(rim * reach))
-        draw.ellipse((middle - r, middle - r, middle + r, middle + r), outline=fill, width=line)
-    return np.asarray(image.resize((size, size), Image.Resampling.LANCZOS))
-
-
-@functools.cache
-def glow(size: int, colour: Colour) -> Sprite:
-    """Return a soft disc with a thin rim."""
-    along = (np.arange(size) + 0.5) / size * 2 - 1
-    away = np.hypot(along[:, None], along)
-    rim = np.clip(1 - np.abs(away - 0.9) * size / 3, 0, 1)
-    sprite = np.empty((size, size, 4), dtype=np.uint8)
-    sprite[..., :3] = colour
-    sprite[..., 3] = 255 * np.maximum(0.75 * rim, np.where(away < 0.9, 0.16, 0.0))
-    return sprite
