@@ -97,15 +97,13 @@ def test_a_recreated_map_depends_on_the_seed_alone():
 
 @pytest.mark.slow
 def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch):
-    monkeypatch.setattr(pictures, "PC", (0.25,))
-    monkeypatch.setattr(pictures, "PM", (0.1, 0.2))
     few = [e for e in PAPERS["han2007"]() if e.printed is not None and e.options.get("ants", 0) < 500]
     monkeypatch.setattr(reproduction, "PAPERS", {"han2007": lambda: few})
     seen = []
     found = measure_again(["han2007"], tmp_path, seeds=2, progress=seen.append)
     rows, files = (
         found.rows,
-        found.files | pictures.draw_figures({"han2007": found.of("han2007")}, tmp_path, 2, (".png",)),
+        found.files | pictures.draw_figures({"han2007": found.of("han2007")}, tmp_path, (".png",)),
     )
     assert seen[-1] == 1
     assert [row.printed for row in rows] == [45.357, 38.6223, 33.1798, 33.1798]
@@ -113,7 +111,7 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
         assert row.best <= row.mean
         assert row.arrived == row.seeds == 2
         assert row.gap > -0.15
-    figures = {"han2007 maps", "han2007 history", "han2007 run", "han2007 ants", "han2007 sweep"}
+    figures = {"han2007 maps", "han2007 history"}
     assert set(files) == {"table", "csv", "claims", "claims csv", "arms"} | figures
     # Those claims are judged whose experiments were run: not the means of all three numbers of ants.
     sources = [verdict.claim.source for verdict in found.verdicts]
@@ -142,23 +140,9 @@ def test_an_unknown_paper_is_refused(tmp_path):
         measure_again(["nobody"], tmp_path, seeds=1)
 
 
-def test_a_paper_is_filmed_with_its_planning(tmp_path, monkeypatch):
-    shown = {}
-
-    def film(rollout, path, **options):
-        shown.update(options, path=path, rollout=rollout)
-
-    monkeypatch.setattr(pictures, "film", film)
-    assert pictures.film_paper("han2007", tmp_path) == tmp_path / "han2007.mp4"
-    assert shown["rollout"].outcome.value == "stopped at the goal without contact"
-    assert shown["prelude"] > 0  # the colony plans in iterations
-    assert set(pictures.SCENES) == set(PAPERS)
-    for paper, scene in pictures.SCENES.items():
-        assert (scene.map, scene.name) in {(e.map, e.name) for e in PAPERS[paper]()}
-
-
 def test_a_picture_becomes_a_world_that_a_robot_drives():
-    task = pictures.paper_scenario("ibraheem2016").task
+    experiment = next(one for one in PAPERS["ibraheem2016"]() if one.map == "20×20")
+    task = pictures.experiment_scenario(experiment).task
     assert task.start[:2] == (0.5 * pictures.CELL, 0.5 * pictures.CELL)
     assert task.goal == (19.5 * pictures.CELL, 19.5 * pictures.CELL)
     assert len(task.world.discs)

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from antdrive.base.errors import FieldError, few
-from antdrive.base.tables import marked, table
+from antdrive.base.tables import marked, rounded_down, table
 from antdrive.sim.settings import COMPARED_SMOOTHING
 
 if TYPE_CHECKING:
@@ -121,7 +121,13 @@ class Comparison:
     def headings(self) -> tuple[str, ...]:
         """Headings of `rows`."""
         where = ("world", "seed") if len(self.cases) > 1 else ()
-        return (*where, "planner", PATH, "s", "clearance m", "certified m", "outcome")
+        ended = () if self.succeeded else ("outcome",)
+        return (*where, "planner", PATH, "s", "clearance m", "certified m", *ended)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether every run succeeded."""
+        return all(run.facts["succeeded"] for run in self.runs)
 
     @property
     def rows(self) -> list[tuple[str, ...]]:
@@ -130,11 +136,16 @@ class Comparison:
 
     def lines(self) -> Iterator[str]:
         """Yield the runs, differences between planners, and equal drives as lines."""
-        yield from table(self.headings, ((*cells, marked(ended == "succeeded", ended)) for *cells, ended in self.rows))
+        rows = self.rows
+        if not self.succeeded:
+            rows = [(*cells, marked(ended == "succeeded", ended)) for *cells, ended in rows]
+        yield from table(self.headings, rows)
         if len(self.cases) > 1:
             yield f"differences from {self.labels[0]} where both succeeded: median (minimum to maximum)"
             heads = ("planner", "succeeded", "pairs", *COMPARED.values())
             yield from table(heads, map(difference_cells, self.differences))
+        if self.succeeded:
+            yield marked(True, f"all {len(self.runs)} runs succeeded")
         yield from self.same
 
     def _row(self, same: Sequence[Compared]) -> tuple[str, ...]:
@@ -149,7 +160,8 @@ class Comparison:
         ended = "succeeded" if first.facts["succeeded"] else first.facts["sentence"]
         return (
             *(*where, ", ".join(run.label for run in same), *cells),
-            *(f"≥ {certificate['bound_m']:.3f}" if certified else "-", ended),
+            f"≥ {rounded_down(certificate['bound_m'], 3):.3f}" if certified else "-",
+            *([] if self.succeeded else [ended]),
         )
 
     @property

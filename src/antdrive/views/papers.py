@@ -1,37 +1,22 @@
-"""Figures of the papers, and films of a drive on one of each paper's maps."""
+"""Figures of the papers, and scenarios on their maps."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from antdrive.base import Pose
-from antdrive.planners import capabilities_of
-from antdrive.robots import load_robot
-from antdrive.runs.papers import maps
-from antdrive.runs.papers.claims import Arm
 from antdrive.runs.papers.experiment import Experiment
-from antdrive.runs.papers.experiments import PAPERS
-from antdrive.runs.papers.maps import HAN_ANTS
-from antdrive.runs.papers.paper_runs import PaperRun, solve
-from antdrive.sim.pipeline import run
+from antdrive.runs.papers.paper_runs import PaperRun
 from antdrive.sim.scenario import Scenario
 from antdrive.views.colours import LabelStyle, label_styles
 from antdrive.views.figures.canvas import endings
-from antdrive.views.figures.paper_figures import (
-    ConvergenceCurve,
-    ants_figure,
-    convergence_figure,
-    maps_figure,
-    sweep_figure,
-)
-from antdrive.views.film.video import film
-from antdrive.worlds import Disc, Task, World
+from antdrive.views.figures.paper_figures import ConvergenceCurve, convergence_figure, maps_figure
 from antdrive.worlds.formats.cellmap import CellMap, map_task
 
 if TYPE_CHECKING:
@@ -39,45 +24,25 @@ if TYPE_CHECKING:
 
 PAINTED = 3  # planners per map
 CURVES = 3  # planners per panel of lengths by iteration
-PC, PM = (0.1, 0.25, 0.5, 0.75, 0.9), (0.05, 0.1, 0.2, 0.4, 0.6)  # crossover, mutation: han2007's sweep
 CELL = 0.8  # side of a cell of a paper's map [m]: a turtlebot passes between two blocked ones
-HAN_UNIT = 0.7  # unit of han2007 [m]
-SIZE, FPS = (480, 360), 20.0
-PRELUDE, DRIVE = 3.0, 9.0  # length of planning and drive in a film [s]
 
 Measured: TypeAlias = Sequence[tuple[Experiment, list[PaperRun]]]
 
 
-def draw_figures(papers: Mapping[str, Measured], folder: Path, seeds: int, suffixes: Sequence[str]) -> dict[str, str]:
-    """Draw the figures of papers and return their paths by name. A planner with its setting has one colour in all of them.
+def draw_figures(papers: Mapping[str, Measured], folder: Path, suffixes: Sequence[str]) -> dict[str, str]:
+    """Draw the maps and histories of papers and return the figures' paths by name.
 
-    There are two figures of length by iteration: `history` shows all seeds with intervals, `run` one run as in the papers.
+    A planner with its setting has one colour in all of them.
     """
     drawn = {e.name: e.planner for found in papers.values() for e in [*_convergent(found), *_painted(found)]}
     styles = dict(zip(drawn, label_styles(list(drawn), list(drawn.values())), strict=True))
     files: dict[str, str] = {}
-    for paper, found in papers.items():
-        files |= _paper_figures(paper, found, folder, seeds, suffixes, styles)
-    return files
-
-
-def _paper_figures(
-    paper: str, found: Measured, folder: Path, seeds: int, suffixes: Sequence[str], styles: Mapping[str, LabelStyle]
-) -> dict[str, str]:
-    files: dict[str, str] = {}
-    curves = _curves(found, styles)
-    for suffix, end in endings(suffixes):
-        if curves:
-            for name, single in (("history", False), ("run", True)):
-                path = folder / f"{paper}-{name}{suffix}"
-                convergence_figure(curves, path, single=single)
-                files[f"{paper} {name}{end}"] = str(path)
-        drawn_on = folder / f"{paper}-maps{suffix}"
-        maps_figure(_drawn(found), drawn_on, styles=styles)
-        files[f"{paper} maps{end}"] = str(drawn_on)
-        if paper == "han2007":
-            drawn = _han_figures(found, folder, seeds, suffix)
-            files |= {f"{name}{end}": str(path) for name, path in drawn.items()}
+    for (paper, found), (suffix, end) in itertools.product(papers.items(), endings(suffixes)):
+        if curves := _curves(found, styles):
+            files[f"{paper} history{end}"] = str(folder / f"{paper}-history{suffix}")
+            convergence_figure(curves, files[f"{paper} history{end}"])
+        files[f"{paper} maps{end}"] = str(folder / f"{paper}-maps{suffix}")
+        maps_figure(_drawn(found), files[f"{paper} maps{end}"], styles=styles)
     return files
 
 
@@ -93,9 +58,10 @@ def _curves(found: Measured, styles: Mapping[str, LabelStyle]) -> dict[str, list
                 style=styles[experiment.name],
                 best=[trial.result.history.best for trial in trials],
                 maps=np.array([trial.world for trial in trials], dtype=np.int64),
-                steps=np.array([trial.work for trial in trials]) if counted else None,
+                spent=1e-6 * np.array([trial.work for trial in trials]) if counted else None,
                 optimum=float(np.median([trial.optimum for trial in trials])),
                 printed=experiment.printed,
+                x="million ant steps" if counted else "iteration",
             )
         )
     return curves
@@ -137,86 +103,11 @@ def _drawn(found: Measured) -> dict[str, tuple[Query, dict[str, PlanResult]]]:
     return maps_drawn
 
 
-def _han_figures(found: Measured, folder: Path, seeds: int, suffix: str) -> dict[str, Path]:
-    """Draw han2007's path lengths by number of ants and by the genetic algorithm's parameters."""
-    with_ants = [(e, trials) for e, trials in found if e.planner == "aco-han" and e.printed is not None]
-    lengths = {int(e.options["ants"]): [t.length for t in trials if t.result.solved] for e, trials in with_ants}
-    printed = {int(experiment.options["ants"]): experiment.printed or math.nan for experiment, _ in with_ants}
-    ants, sweep = folder / f"han2007-ants{suffix}", folder / f"han2007-sweep{suffix}"
-    shortest = maps.optimum(maps.cutting_corners(maps.han_ants()))
-    ants_figure(lengths, ants, planner="aco-han", printed=printed, unit="cells", optimum=shortest)
-    sweep_figure(PC, PM, _sweep(seeds), sweep)
-    return {"han2007 ants": ants, "han2007 sweep": sweep}
-
-
-def _sweep(seeds: int) -> dict[bool, Any]:
-    """Return mean path lengths of the genetic algorithm by crossover and mutation, with and without elitism."""
-    query = maps.han_genes()
-    found = {}
-    for elitism in (True, False):
-        values = np.full((len(PC), len(PM)), np.nan)
-        for (i, j), _ in np.ndenumerate(values):
-            options = {"crossover": PC[i], "mutation": PM[j], "elitism": elitism}
-            trials = [solve("ga-han", options, query, seed) for seed in range(seeds)]
-            lengths = [trial.length if elitism else trial.last for trial in trials if trial.result.solved]
-            values[i, j] = np.mean(lengths) if lengths else np.nan
-        found[elitism] = values
-    return found
-
-
-#: Experiment whose first map is filmed, by paper.
-SCENES: Mapping[str, Arm] = MappingProxyType(
-    {
-        "han2007": Arm("14 obstacles", "100 ants"),
-        "suganthi2019": Arm("20×20", "iaco"),
-        "ibraheem2016": Arm("20×20", "maco"),
-        "lee2008": Arm("2: 50×44", "pfaco"),
-        "hasan": Arm("1a curved walls", "mmas-dstar"),
-    }
-)
-
-
-def paper_scenario(paper: str) -> Scenario:
-    """Return the scenario of a paper's film: its planner and parameters on its first map."""
-    scene = SCENES[paper]
-    experiment = next(e for e in PAPERS[paper]() if (e.map, e.name) == (scene.map, scene.name))
-    if paper == "han2007":
-        task = _han_task()
-    else:
-        query = experiment.query(0)
-        (r0, c0), (r1, c1) = query.start, query.goal
-        heading = math.atan2(r1 - r0, c1 - c0)
-        start: Pose = ((c0 + 0.5) * CELL, (r0 + 0.5) * CELL, heading)
-        goal = ((c1 + 0.5) * CELL, (r1 + 0.5) * CELL)
-        task = map_task(CellMap(query.grid.free, CELL, (0.0, 0.0)), start, goal, name=f"{paper} {scene.map}")
+def experiment_scenario(experiment: Experiment) -> Scenario:
+    """Return the scenario of an experiment on cells: a drive on its first map, planned by its planner and options."""
+    query = experiment.query(0)
+    (r0, c0), (r1, c1) = query.start, query.goal
+    start: Pose = ((c0 + 0.5) * CELL, (r0 + 0.5) * CELL, math.atan2(r1 - r0, c1 - c0))
+    goal = ((c1 + 0.5) * CELL, (r1 + 0.5) * CELL)
+    task = map_task(CellMap(query.grid.free, CELL, (0.0, 0.0)), start, goal, name=experiment.map)
     return Scenario.of(task, experiment.planner, options=experiment.options, seed=0)
-
-
-def film_paper(paper: str, folder: Path) -> Path | None:
-    """Drive and film a paper's scenario, with planning for iterative planners; return None without a drive."""
-    scenario = paper_scenario(paper)
-    result = run(scenario)
-    if result.rollout is None:
-        return None
-    target = folder / f"{paper}.mp4"
-    film(
-        result.rollout,
-        target,
-        camera="top",
-        size=SIZE,
-        fps=FPS,
-        speed=max(1.0, float(result.rollout.t[-1]) / DRIVE),
-        note=f"{paper}: {scenario.planner_name}",
-        prelude=PRELUDE if capabilities_of(scenario.planner).iterative else 0.0,
-    )
-    return target
-
-
-def _han_task() -> Task:
-    """Return the map of han2007's ants [m]. The thesis' robot is a point: discs shrink by the robot's radius and margin."""
-    low, high = 0.0, 21.0 * HAN_UNIT
-    radius = HAN_UNIT - load_robot("turtlebot").radius - 0.03
-    discs = tuple(Disc(x * HAN_UNIT, y * HAN_UNIT, radius) for x, y in HAN_ANTS)
-    world = World("han2007 ants", (low, low, high, high), discs)
-    start: Pose = (HAN_UNIT, HAN_UNIT, math.pi / 4)
-    return Task(world, start, (20 * HAN_UNIT, 20 * HAN_UNIT), cell=HAN_UNIT)

@@ -13,13 +13,15 @@ from antdrive.base.files import file_name, write_json
 from antdrive.runs.results_folder import free_folder
 
 if TYPE_CHECKING:
-    from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
 
-FIGURES = ("overview", "certificate", "sight", "plan", "tour", "history", "field-bars", "field-contours")
+FORMATS = ("png", "pdf", "svg")
 #: All files of `write_run`.
-RUN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES for suffix in (".png", ".pdf")))
+RUN_FILES = (
+    *("result.json", "rollout.npz", "drive.html"),
+    *(f"{n}.{f}" for n in ("overview", "certificate", "plan") for f in FORMATS),
+)
 
 
 def check_folder(folder: Path) -> None:
@@ -38,8 +40,6 @@ def check_film(path: Path | None, prelude: float, scenarios: Sequence[Scenario])
     from antdrive.planners.iterative import without_iterations
     from antdrive.views.film.film_options import ENCODERS
 
-    if prelude and path is None:
-        raise InputError("--prelude: needs --film")
     if prelude and not any(capabilities_of(each.planner).iterative for each in scenarios):
         first, several = scenarios[0], "needs an iterative planner; none of these is one"
         one = without_iterations(first.planner, first.planner_name)
@@ -62,15 +62,29 @@ def default_folder(scenario: Scenario) -> Path:
     return free_folder(Path("out") / "-".join(map(file_name, parts)), "result.json", scenario.key[:8])
 
 
-def suffixes(vector: bool) -> tuple[str, ...]:
-    """Return the file suffixes of figures."""
-    return (".png", ".pdf") if vector else (".png",)
+def formats_of(figures: str | None, no_figures: bool = False) -> tuple[str, ...] | None:
+    """Return the suffixes of `--figures FORMATS`; None for `--no-figures`."""
+    chosen = tuple(dict.fromkeys(part.strip() for part in (figures or "").split(",") if part.strip()))
+    if unknown := set(chosen) - set(FORMATS):
+        raise InputError(f"--figures {figures}: unknown format {min(unknown)}; choose from {', '.join(FORMATS)}")
+    if no_figures and chosen:
+        raise InputError(f"--no-figures: contradicts --figures {figures}")
+    return None if no_figures else tuple(f".{kind}" for kind in chosen)
 
 
-def write_run(run: Run, folder: Path, command: str, *, vector: bool = False, figures: bool = True) -> dict[str, Any]:
-    """Write a run's log, `result.json` and figures into a folder, and return the content of `result.json`.
+def write_run(
+    run: Run, folder: Path, command: str, formats: Sequence[str] | None = (), *, view: bool = False
+) -> dict[str, Any]:
+    """Write a run's log, `result.json`, page, overview and figures for papers into a folder; return the content of `result.json`.
 
     Each is kept if the next cannot be written. The files of an earlier run in that folder are removed.
+
+    Args:
+        run: the run
+        folder: the folder
+        command: the command that made the run
+        formats: suffixes of the figures for papers; None: not even the overview
+        view: whether to write the page drive.html
     """
     files, saved = {"result": str(folder / "result.json")}, list[str]()
     if run.rollout is not None:
@@ -81,10 +95,16 @@ def write_run(run: Run, folder: Path, command: str, *, vector: bool = False, fig
             (folder / name).unlink(missing_ok=True)
     with naming_saved(saved):
         result = write_result(run, files, command)
-    if not figures:
+    if view and run.logged is not None:
+        from antdrive.views.viewer.drive_page import write_page
+
+        with naming_saved(files.values()):
+            files["page"] = str(write_page([run], folder / "drive.html"))
+            result = write_result(run, files, command)
+    if formats is None:
         return result
     with naming_saved(files.values()):
-        return write_result(run, files | _write_figures(run, folder, suffixes(vector)), command)
+        return write_result(run, files | _write_figures(run, folder, formats), command)
 
 
 @contextmanager
@@ -97,30 +117,24 @@ def naming_saved(files: Iterable[str]) -> Iterator[None]:
         raise InputError(f"{error}; saved: {saved}" if saved else str(error)) from None
 
 
-def _write_figures(run: Run, folder: Path, kinds: Sequence[str]) -> dict[str, str]:
-    if run.rollout is None:
-        from antdrive.views.figures.run_figures import draw_run
+def _write_figures(run: Run, folder: Path, formats: Sequence[str]) -> dict[str, str]:
+    from antdrive.views.figures.run_figures import draw_run
 
-        draw_run(run, str(folder / "overview.png"))
-        return {"figure": str(folder / "overview.png")}
-    from antdrive.views.figures.canvas import endings
-    from antdrive.views.figures.plan_figures import plan_figures
-    from antdrive.views.figures.run_figures import certificate_figure, overview
-    from antdrive.views.figures.sight_figure import sight_figure
+    s, files = run.scenario, {"figure": str(folder / "overview.png")}
+    draw_run(run, files["figure"])
+    for suffix in formats:
+        from antdrive.views.figures.plan_figures import plan_figure
+        from antdrive.views.figures.run_figures import certificate_figure
 
-    s, files = run.scenario, dict[str, str]()
-    for suffix, end in endings(kinds):
-        files["figure" + end] = str(folder / f"overview{suffix}")
-        overview(run.rollout, files["figure" + end])
-        if run.certificate is not None:
-            files["certificate" + end] = str(folder / f"certificate{suffix}")
-            certificate_figure(run.rollout, run.certificate, files["certificate" + end])
-        if run.rollout.record.mapless and len(run.rollout.scans):
-            files["sight" + end] = str(folder / f"sight{suffix}")
-            sight_figure(run.rollout, files["sight" + end])
-    known: dict[str, Any] = {"name": s.planner_name, "suffixes": kinds, "mapped": not s.mapless}
-    made = plan_figures(s.task, run.grid, run.plan, s.robot, folder, **known)
-    return files | {name: str(path) for name, path in made.items()}
+        if suffix != ".png":
+            files[f"figure {suffix[1:]}"] = str(folder / f"overview{suffix}")
+            draw_run(run, files[f"figure {suffix[1:]}"])
+        if run.rollout is not None and run.certificate is not None:
+            files[f"certificate {suffix[1:]}"] = str(folder / f"certificate{suffix}")
+            certificate_figure(run.rollout, run.certificate, files[f"certificate {suffix[1:]}"])
+            files[f"plan {suffix[1:]}"] = str(folder / f"plan{suffix}")
+            plan_figure(s.task, run.grid, run.plan, s.robot, files[f"plan {suffix[1:]}"], mapped=not s.mapless)
+    return files
 
 
 def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, Any]:
@@ -128,13 +142,3 @@ def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, 
     result = {**run.as_dict(), "fingerprint": run.scenario.key[:8], "files": dict(files), "command": command}
     write_json(Path(files["result"]), result)
     return result
-
-
-def write_film(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
-    """Film a drive, or several side by side, and return facts about the film."""
-    from antdrive.views.film.comparison_film import compare_film
-    from antdrive.views.film.video import film
-
-    several = len(logs) > 1
-    info = compare_film(logs, path, **options) if several else film(logs[0], path, **options)
-    return {"file": str(info.path), "frames": info.frames, "size": list(info.size), "fps": info.fps}

@@ -14,7 +14,7 @@ CATALOGUE = Path(robots.__path__[0]) / "catalog"
 
 
 @pytest.mark.slow
-def test_planners_are_compared_in_a_table_a_figure_and_a_film(antdrive, small, tmp_path):
+def test_planners_are_compared_in_a_table_a_figure_a_page_and_a_film(antdrive, small, tmp_path):
     words = ("--out", "c", "--film", "c.mp4", "--speed", "20")
     code, out, err = antdrive("compare", small, "-p", "astar", "-p", "tangent", *words, "--json")
     facts = json.loads(out)
@@ -25,6 +25,7 @@ def test_planners_are_compared_in_a_table_a_figure_and_a_film(antdrive, small, t
         assert result["command"].startswith("antdrive run ")
         assert f"--planner {name}" in result["command"]
     assert Path("c.mp4").stat().st_size > 1000
+    assert [antdrive("verify", f"c/drives.html#{k}")[0] for k in (1, 2)] == [0, 0]
     logs = [tmp_path / "c" / name / "rollout.npz" for name in facts["runs"]]
     assert antdrive("render", *logs, "-o", "again.gif", "--size", "320x240", "--speed", "30")[0] == 0
     assert Path("again.gif").exists()
@@ -41,7 +42,7 @@ def test_fewer_than_two_paths_are_nothing_to_compare(antdrive, tmp_path):
     words = ["compare", "no-path", "-p", "astar", "-p", "dijkstra", "--out", str(tmp_path / "c"), "--no-figures"]
     code, _, err = antdrive(*words)
     assert code == 1
-    assert "no comparison figure or film" in err
+    assert "no comparison figure, page or film" in err
 
 
 def test_the_command_that_repeats_a_run_names_the_robot_as_it_was_given(antdrive, small):
@@ -99,7 +100,7 @@ def test_planners_drive_their_own_plans_unless_a_smoothing_is_given(antdrive, sm
     assert [line.split("  ")[0] for line in own[1:3]] == ["astar", "few"]
     assert smooth[1].startswith("astar, few  ")
     assert (
-        smooth[2] == "astar and few drive the same line: smoothing clearance makes one route of their different plans"
+        smooth[3] == "astar and few drive the same line: smoothing clearance makes one route of their different plans"
     )
     given = json.loads(antdrive(*words, "--json")[1])
     assert [drive["smoothing"] for drive in given["drives"]] == ["none", "none"]

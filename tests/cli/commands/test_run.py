@@ -1,7 +1,11 @@
 """`antdrive run` and `antdrive plan`."""
 
+import contextlib
 import json
+import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -70,11 +74,55 @@ def test_a_run_without_a_path_removes_the_log_of_an_earlier_run(antdrive, small)
 @pytest.mark.slow
 def test_a_run_replaces_the_files_of_an_earlier_run_and_no_others(antdrive, small, tmp_path):
     antdrive(
-        "run", small, "-p", "aco-han", "-s", "planner.ants=50", "-s", "planner.iterations=5", "--vector", "--out", "o"
+        "run",
+        small,
+        "-p",
+        "aco-han",
+        "-s",
+        "planner.ants=50",
+        "-s",
+        "planner.iterations=5",
+        "--figures",
+        "pdf",
+        "--out",
+        "o",
     )
+    written = {
+        "drive.html",
+        "result.json",
+        "rollout.npz",
+        "overview.png",
+        "overview.pdf",
+        "certificate.pdf",
+        "plan.pdf",
+    }
+    assert {path.name for path in (tmp_path / "o").iterdir()} == written
     (tmp_path / "o" / "mine.txt").touch()
     antdrive("run", "no-path", "-p", "astar", "--out", "o")
     assert {path.name for path in (tmp_path / "o").iterdir()} == {"result.json", "overview.png", "mine.txt"}
+
+
+def test_no_bar_outlives_an_error_on_a_terminal(tmp_path):
+    """Planners with options are user code, at which the process forks: nothing draws for the parent that waits."""
+    leader, follower = os.openpty()
+    words = [sys.executable, "-m", "antdrive", "run", "empty", "-p", "astar", "-s", "planner.ants=3"]
+    streams = dict.fromkeys(("stdin", "stdout", "stderr"), follower)
+    with subprocess.Popen(words, **streams, cwd=tmp_path, env={**os.environ, "TERM": "xterm"}):
+        os.close(follower)
+        shown = b""
+        with contextlib.suppress(OSError):  # the terminal's end
+            while part := os.read(leader, 4096):
+                shown += part
+    os.close(leader)
+    before, _, after = shown.partition(b"no option of astar is called")
+    assert b"reading the scenario" in before
+    assert before.rindex(b"\x1b[?25h") < before.rindex(b"\x1b[2K"), "the cursor is shown, the line is erased"
+    assert b"reading" not in after
+
+
+def test_figures_of_unknown_formats_are_refused(antdrive, small):
+    assert "choose from png, pdf, svg" in antdrive("run", small, "-p", "astar", "--figures", "pdf,bmp")[2]
+    assert "contradicts" in antdrive("run", small, "-p", "astar", "--figures", "pdf", "--no-figures")[2]
 
 
 @pytest.mark.slow
@@ -107,7 +155,7 @@ def test_noise_of_a_robot_whose_file_has_none_is_said_to_change_nothing(antdrive
 
 
 def test_without_figures_a_run_writes_its_log_and_result(antdrive, small):
-    assert antdrive("run", small, "-p", "astar", "--no-figures", "--out", "bare")[0] == 0
+    assert antdrive("run", small, "-p", "astar", "--no-figures", "--no-view", "--out", "bare")[0] == 0
     assert sorted(path.name for path in Path("bare").iterdir()) == ["result.json", "rollout.npz"]
 
 

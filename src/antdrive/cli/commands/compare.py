@@ -1,7 +1,7 @@
 """`antdrive compare`."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,7 +22,7 @@ from antdrive.cli.scenario_options import Ends
 from antdrive.runs.comparing import FAULTS, compare_scenarios
 from antdrive.runs.results_folder import mark_of
 from antdrive.sim.settings import COMPARED_SMOOTHING
-from antdrive.views.run_folder import check_film, check_folder, write_run
+from antdrive.views.run_folder import check_folder, formats_of, write_run
 
 if TYPE_CHECKING:
     from antdrive.base.components import ComponentError
@@ -60,15 +60,16 @@ def compare(
     seeds: Annotated[int, option("NUMBER", "Seeds per world, starting at --seed.", min=1, max=10_000)] = 1,
     ends: Ends,
     out: options.Out = None,
-    figures: options.Figures = True,
-    film: Annotated[Path | None, option("FILE", "Film the first world side by side: .mp4, .gif or .webp.")] = None,
-    prelude: options.Prelude = 0.0,
-    speed: options.Speed = 1.0,
+    figures: options.Figures = None,
+    no_figures: options.NoFigures = False,
+    no_view: options.NoView = False,
+    film: Annotated[Path | None, option("FILE", "Film the first pair in one picture: .mp4, .gif or .webp.")] = None,
+    filming: options.Filming,
     query: CampaignQuery,
     json: options.Json = False,
     **given: Any,
 ) -> int:
-    """Compare planners, or controllers, on worlds or from campaign results.
+    """Compare planners or controllers, in worlds or from campaigns.
 
     Worlds: pairs the planners by world and seed; planners drive their own plans, unless --smoothing is given. Figures and film
     show the first pair. Exit code 0: every run succeeded.
@@ -89,7 +90,8 @@ def compare(
     names = list(dict.fromkeys(scenario.task.world.name for scenario in every))
     if len(names) < len(worlds):
         raise InputError(f"{' '.join(worlds)}: world names must be unique")
-    check_film(film, prelude, every)
+    drawn = formats_of(figures, no_figures)
+    film_options = filming.checked(film, every, several=True)
     print_idle_settings(every, {"seed"} if seeds > 1 else ())
     numbers = range(given["seed"], given["seed"] + seeds)
     cases = [(name, number) for name in names for number in numbers]
@@ -113,7 +115,7 @@ def compare(
                 print_traceback(result)
                 return result, None
             command = scenario.written.command() or ""
-            write_run(result, part, command, figures=figures and case == cases[0])
+            write_run(result, part, command, drawn if case == cases[0] else None)
             return result, str(part)
 
         compared = compare_scenarios(scenarios, numbers, attempt)
@@ -121,27 +123,45 @@ def compare(
         folders = {run.label: run.facts["folder"] for run in first if run.facts["folder"]}
         files = folders if len(cases) == 1 else {"folder": str(folder)}
         write_json(folder / MARKER, {**facts, **compared.as_dict()})
-        files |= _views(compared.logs, folder, film, figures, speed=speed, prelude=prelude)
+        files |= _views(compared.logs, folder, film, drawn, film_options, view=not no_view)
     results = {"runs": {run.label: run.facts for run in first}, **compared.as_dict(), "files": files}
     show(json, results, [*compared.lines(), *file_lines(files)])
     errors = Counter(run.facts["reason"] for run in compared.runs if run.facts["outcome"] in FAULTS)
     code = print_faults(dict(errors.most_common()))
     if len(compared.logs) < 2:
         planned = "only one planner" if compared.logs else "no planner"
-        print_error(f"{planned} found a path: no comparison figure or film")
+        print_error(f"{planned} found a path: no comparison figure, page or film")
     return code or (SUCCEEDED if all(run.facts["succeeded"] for run in compared.runs) else FAILED)
 
 
 def _views(
-    logs: "Mapping[str, Rollout]", folder: Path, film: Path | None, figures: bool, **options: float
+    logs: "Mapping[str, Rollout]",
+    folder: Path,
+    film: Path | None,
+    formats: Sequence[str] | None,
+    options: dict[str, Any],
+    *,
+    view: bool,
 ) -> dict[str, str]:
-    """Write the figure and the film of the first world and seed. Return their paths."""
+    """Write page, figure and film of the first world and seed. Return their paths. The page holds the first four drives."""
     files: dict[str, str] = {}
-    if len(logs) > 1 and figures:
+    if len(logs) < 2:
+        return files
+    if view:
+        from antdrive.sim.facts import LoggedRun
+        from antdrive.views.viewer.drive_page import MOST_DRIVES, write_page
+
+        shown = [*logs][:MOST_DRIVES]
+        if len(shown) < len(logs):
+            print_error(f"drives.html shows the first {MOST_DRIVES} of {len(logs)} drives; for others: antdrive view")
+        files["page"] = str(write_page([LoggedRun.of(logs[name]) for name in shown], folder / "drives.html", shown))
+    if formats is not None:
+        from antdrive.views.figures.canvas import endings
         from antdrive.views.figures.run_figures import comparison_figure
 
-        comparison_figure(logs, folder / "comparison.png")
-        files["figure"] = str(folder / "comparison.png")
-    if len(logs) > 1 and film is not None:
-        files["film"] = film_drives(list(logs.values()), film, titles=list(logs), **options)["file"]
+        for suffix, end in endings(dict.fromkeys((".png", *formats))):
+            files[f"figure{end}"] = str(folder / f"comparison{suffix}")
+            comparison_figure(logs, files[f"figure{end}"])
+    if film is not None:
+        files["film"] = film_drives(logs, film, **options)["file"]
     return files

@@ -9,7 +9,7 @@ from antdrive.cli import options
 from antdrive.cli.console import planning, show
 from antdrive.cli.options import option
 from antdrive.cli.scenario_options import Ends, Setup
-from antdrive.views.run_folder import suffixes
+from antdrive.views.run_folder import formats_of
 
 
 @options.with_settings(("margin", "footprint", "cell", "seed"))
@@ -19,7 +19,7 @@ def plan(
     setup: Setup,
     ends: Ends,
     out: Annotated[Path | None, option("FOLDER", "Folder for the plan's figures.")] = None,
-    vector: options.Vector = False,
+    figures: options.Figures = "png",
     json: options.Json = False,
     **given: Any,
 ) -> bool:
@@ -31,17 +31,19 @@ def plan(
     from antdrive.sim.pipeline import plan as make_plan
     from antdrive.sim.summary import plan_lines
 
+    formats = formats_of(figures) or ()
     scenario = setup.scenario(ends.of(world), given)
     with planning(f"planning with {scenario.planner_name}"), keep_best():
         grid, answer = make_plan(scenario)
     files: dict[str, str] = {}
     if out is not None:
-        from antdrive.views.figures.plan_figures import plan_figures
+        from antdrive.views.figures.canvas import endings
+        from antdrive.views.figures.plan_figures import plan_figure
 
-        named: dict[str, Any] = {"name": scenario.planner_name, "suffixes": suffixes(vector)}
         with folder_lock(out):
-            made = plan_figures(scenario.task, grid, answer, scenario.robot, out, **named)
-        files = {name: str(path) for name, path in made.items()}
+            for suffix, end in endings(formats):
+                files[f"plan{end}"] = str(out / f"plan{suffix}")
+                plan_figure(scenario.task, grid, answer, scenario.robot, files[f"plan{end}"])
     facts = {
         "world": scenario.task.world.name,
         "planner": scenario.planner_name,

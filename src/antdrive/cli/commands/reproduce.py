@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 from antdrive.base.files import write_json
 from antdrive.base.progress import bar
 from antdrive.base.tables import file_lines, table
-from antdrive.base.version import require_physics
 from antdrive.cli import options
 from antdrive.cli.console import print_error, show
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import results_folder
-from antdrive.views.run_folder import suffixes
+from antdrive.views.run_folder import formats_of
 
 if TYPE_CHECKING:
     from antdrive.runs.papers.claims import Verdict
@@ -30,8 +29,7 @@ def reproduce(
         bool, flag("At most six seeds, fewer ant steps, two maps per figure, no slow experiments.", "--quick")
     ] = False,
     jobs: options.Jobs = None,
-    films: Annotated[bool, flag("Film one plan and drive per paper.", "--film")] = False,
-    vector: options.Vector = False,
+    figures: options.Figures = "png",
     json: options.Json = False,
 ) -> None:
     """Repeat a paper's experiments and test its claims.
@@ -45,8 +43,7 @@ def reproduce(
     from antdrive.runs.papers.reproduction import reproduce as repeat
     from antdrive.views.papers import draw_figures
 
-    if films:
-        require_physics()
+    drawn = formats_of(figures) or ()
     papers = list(PAPERS) if paper == "all" else [paper]
     seeds = min(seeds, QUICK_SEEDS) if quick else seeds
     few = too_few_seeds(papers, seeds, quick=quick)
@@ -57,13 +54,7 @@ def reproduce(
         with bar("planning") as progress:
             reproduction = repeat(papers, folder, seeds=seeds, jobs=jobs, quick=quick, progress=progress)
             found = {one: reproduction.of(one) for one in papers}
-            files = reproduction.files | draw_figures(found, folder, 1 if quick else min(seeds, 10), suffixes(vector))
-            for one in papers:
-                if films:
-                    from antdrive.views.papers import film_paper
-
-                    film = film_paper(one, folder)
-                    files |= {} if film is None else {f"{one} film": str(film)}
+            files = reproduction.files | draw_figures(found, folder, drawn)
         result = {
             "rows": [vars(row) for row in reproduction.rows],
             "claims": reproduction.claims,

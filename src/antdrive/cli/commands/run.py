@@ -7,12 +7,19 @@ from antdrive.base.atomic import folder_lock
 from antdrive.base.progress import bar, shown_progress
 from antdrive.base.tables import file_lines, marked
 from antdrive.cli import options
-from antdrive.cli.console import planning, show, this_command
-from antdrive.cli.options import flag, option
+from antdrive.cli.console import planning, print_error, show, this_command
+from antdrive.cli.options import option
 from antdrive.cli.output import film_drives, print_idle_settings
 from antdrive.cli.scenario_options import Ends, Setup
 from antdrive.sim.settings import SETTINGS
-from antdrive.views.run_folder import check_film, check_folder, default_folder, naming_saved, write_result, write_run
+from antdrive.views.run_folder import (
+    check_folder,
+    default_folder,
+    formats_of,
+    naming_saved,
+    write_result,
+    write_run,
+)
 
 
 @options.with_settings(name for name, one in SETTINGS.items() if one.flag)
@@ -23,10 +30,10 @@ def run(
     ends: Ends,
     out: options.Out = None,
     film: Annotated[Path | None, option("FILE", "Film: .mp4, .gif or .webp.", panel="Output")] = None,
-    prelude: options.Prelude = 0.0,
-    vector: options.Vector = False,
-    figures: options.Figures = True,
-    gui: Annotated[bool, flag("Show the drive in a window; needs a display.", "--gui", panel="Output")] = False,
+    filming: options.Filming,
+    figures: options.Figures = None,
+    no_figures: options.NoFigures = False,
+    no_view: options.NoView = False,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
@@ -42,11 +49,8 @@ def run(
     with shown_progress("reading the scenario"):
         scenario = setup.scenario(ends.of(world), given)
     folder = out or default_folder(scenario)
-    if gui:
-        from antdrive.views.window import check_display
-
-        check_display()
-    check_film(film, prelude, [scenario])
+    drawn = formats_of(figures, no_figures)
+    film_options = filming.checked(film, [scenario])
     check_folder(folder)
     print_idle_settings([scenario])
     with folder_lock(folder):
@@ -55,16 +59,14 @@ def run(
         with bar("driving") as progress:
             result = drive(scenario, planned=planned, progress=progress)
         with shown_progress("writing log and figures"):
-            report = write_run(result, folder, this_command(), vector=vector, figures=figures)
+            report = write_run(result, folder, this_command(), drawn, view=not no_view)
         if film is not None and result.rollout is not None:
             with naming_saved(report["files"].values()):
-                filmed = film_drives([result.rollout], film, prelude=prelude)["file"]
+                filmed = film_drives(result.rollout, film, **film_options)["file"]
                 report = write_result(result, {**report["files"], "film": filmed}, this_command())
+        elif film is not None:
+            print_error(f"--film {film}: not written, since the robot did not drive")
     first, *rest = run_lines(result)
     lines = [marked(result.succeeded, first), *rest, *file_lines(report["files"])]
     show(json, report, lines)
-    if gui and result.rollout is not None:
-        from antdrive.views.window import show as show_window
-
-        show_window(result.rollout)
     return result.succeeded

@@ -6,7 +6,7 @@ The file's suffix selects PNG, PDF or SVG. Equal data gives equal bytes: files c
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -109,10 +109,6 @@ def colour_bar(figure: Any, drawn: Any, axes: Any, label: str, **place: Any) -> 
     bar.outline.set_visible(False)
 
 
-#: Placement of a colour bar below a map.
-BELOW: Any = {"orientation": "horizontal", "shrink": 0.6, "aspect": 34}
-
-
 def thinned(count: int, most: int = 1500) -> npt.NDArray[np.intp]:
     """Return at most `most` evenly spaced row indices, including the first and the last."""
     return np.unique(np.linspace(0, count - 1, most).astype(int))
@@ -154,7 +150,7 @@ def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
     return target
 
 
-def endings(suffixes: Sequence[str]) -> list[tuple[str, str]]:
+def endings(suffixes: Iterable[str]) -> list[tuple[str, str]]:
     """Return pairs of suffix and ending of the figure's key: empty for the first suffix."""
     return [(suffix, "" if k == 0 else f" {suffix[1:]}") for k, suffix in enumerate(suffixes)]
 

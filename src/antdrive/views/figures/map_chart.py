@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.collections import LineCollection, PathCollection
-from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.collections import PathCollection
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 from matplotlib.path import Path
 
 from antdrive.base.types import Floats, Point
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views import colours
-from antdrive.views.colours import Colour, hexed
-from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, legend_above, thinned
-from antdrive.views.scene import Scene, contact_point
+from antdrive.views.colours import Colour, hexed, shown_field
+from antdrive.views.figures.canvas import colour_bar, frame_map, legend_above, thinned
+from antdrive.views.scene import Scene, contact_point, decisive_row
 from antdrive.worlds.coverage import share_of
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ FIELD = LinearSegmentedColormap.from_list("field", [hexed(stop) for stop in colo
 SWEPT = 0.02  # motion of the farthest corner between two drawn footprints [m]
 LABEL = (0.5, 0.17)  # width and height of a door's label [inches]; doors within it of a labelled one have none
 MANY = 1000  # cylinders; larger numbers are drawn without edges
-SPEEDS = LinearSegmentedColormap.from_list("speed", [hexed(stop) for stop in colours.SPEED_STOPS])
 
 
 def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
@@ -170,46 +169,30 @@ def _draw_swept(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
     return [Patch(fc=pale, label="area swept")]
 
 
-def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: Floats | None) -> None:
-    """Draw the route, the driven path coloured by speed, the robot's final pose and the first contact."""
+def draw_driven(axes: Any, scene: Scene, rollout: Rollout, cells: Floats | None) -> None:
+    """Draw the route, the driven path, the first contact, and the robot there and at the end."""
     handles: list[Any] = []
     if cells is not None and len(cells):
         handles += axes.plot(*cells.T, ".", ms=2.6, color=hexed(colours.MUTED), label="planned cells", zorder=4.6)
     if len(rollout.route) > 1:
         style = {"ls": (0, (4, 2.5)), "lw": 1.0, "color": hexed(colours.ROUTE)}
-        handles += axes.plot(*rollout.route.T, **style, label=scene.route_label, zorder=4.8)
+        handles += axes.plot(*rollout.route.T, **style, label="route" if scene.mapped else "initial route", zorder=4.8)
         for k, (_, line) in enumerate(rollout.legs()[1:]):
             drawn = axes.plot(*line.T, **{**style, "lw": 0.7, "alpha": 0.45}, label="new routes", zorder=4.7)
             handles += drawn if k == 0 else []
     if len(rollout.t) > 1:
         handles += _draw_swept(axes, scene, rollout)
-        keep, fastest = thinned(len(rollout.t)), scene.robot.max_speed
-        style = {"cmap": SPEEDS, "norm": Normalize(0, fastest), "lw": 2.6, "capstyle": "round"}
-        lines = draw_along(axes, rollout.pose[keep, :2], np.abs(rollout.twist[keep[:-1], 0]), **style)
-        colour_bar(figure, lines, axes, "driven path: speed [m/s]", **BELOW)
-        x, y, yaw = rollout.pose[-1].tolist()
-        _draw_robot(axes, scene, (x, y, yaw), colours.SHELL, 6)
-    draw_legend(axes, [*handles, *draw_contact(axes, scene, rollout)], scene)
-
-
-def draw_along(axes: Any, points: Floats, values: Floats, **style: Any) -> LineCollection:
-    """Draw a polyline (N, 2) coloured by the values (N - 1,) of its segments."""
-    lines = LineCollection(list(np.stack([points[:-1], points[1:]], axis=1)), zorder=5, **style)
-    lines.set_array(values)
-    axes.add_collection(lines)
-    return lines
-
-
-def draw_contact(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
-    """Draw a cross at the first contact and return its legend handles."""
-    if not len(rollout.contacts):
-        return []
-    row = min(rollout.first_contact, len(rollout.t) - 1)
-    at = contact_point(scene, rollout.pose[row], int(rollout.contacts[0, 1]), rollout.movers[row])
-    drawn: list[Any] = axes.plot(
-        *at, "X", ms=9, color=hexed(colours.BAD), mec="white", label="contact", zorder=9, ls="none"
-    )
-    return drawn
+        style = {"color": hexed(colours.SHELL), "lw": 2.0, "label": "driven path", "zorder": 5}
+        handles += axes.plot(*rollout.pose[thinned(len(rollout.t)), :2].T, **style)
+        for row in {decisive_row(rollout), len(rollout.t) - 1}:
+            x, y, yaw = rollout.pose[row].tolist()
+            _draw_robot(axes, scene, (x, y, yaw), colours.SHELL, 6)
+    if len(rollout.contacts):
+        row = min(rollout.first_contact, len(rollout.t) - 1)
+        at = contact_point(scene, rollout.pose[row], int(rollout.contacts[0, 1]), rollout.movers[row])
+        style = {"ms": 9, "color": hexed(colours.BAD), "mec": "white", "label": "contact", "zorder": 9, "ls": "none"}
+        handles += axes.plot(*at, "X", **style)
+    draw_legend(axes, handles, scene)
 
 
 def draw_legend(axes: Any, handles: list[Any], scene: Scene, **place: Any) -> None:
@@ -218,34 +201,21 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene, **place: Any) -> No
     if scene.unseen.any():
         known.append(Patch(fc=hexed(colours.UNSEEN), label=scene.unseen_label))
     if scene.mover_radii:
-        known.append(Patch(fc=hexed(colours.MOVER), label=scene.movers_label))
+        known.append(Patch(fc=hexed(colours.MOVER), label=f"mover at {scene.movers_at:.1f} s"))
     if scene.has_no_go_area:
         known.append(Patch(fc=_pale(colours.ZONE, 0.22), ec=hexed(colours.ZONE), lw=0.5, label=scene.no_go_label))
     legend_above(axes, [*handles, *known], handlelength=1.6, **place)
 
 
-def covering(
-    at: Floats, half: Floats, limits: tuple[Floats, Floats], taken: Sequence[Floats], points: Floats
-) -> Floats:
-    """Return how much a label of half size (2,) [m] covers at each place (N, 2) [m].
-
-    Covered points (M, 2) [m] count 1; another label (centre and half size, `taken`) and the edge of the map (`limits`) 1000.
-    """
-    covered = (np.abs(at[:, None] - points) < half).all(axis=2).sum(axis=1)
-    clashes = sum((np.abs(at - centre) < half + size).all(axis=1).astype(int) for centre, size in taken)
-    outside = ((at - half < limits[0]) | (at + half > limits[1])).any(axis=1)
-    return np.asarray(1000.0 * (clashes + outside) + covered)
-
-
-def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats) -> None:
-    """Draw a planner's field (R, C), such as pheromone or a potential, as coloured cells below the map."""
-    values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return
+def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats, name: str) -> bool:
+    """Draw a planner's field (R, C) as coloured cells below the map; return False, without a drawing, if it is constant."""
+    found = shown_field(grid, field)
+    if found is None:
+        return False
+    values, low, high = found
     (rows, cols), (x, y), half = grid.shape, grid.origin, grid.cell / 2
     extent = (x - half, x + (cols - 0.5) * grid.cell, y - half, y + (rows - 0.5) * grid.cell)
-    low, high = np.quantile(finite, (0.02, 0.995))
-    scale: dict[str, Any] = {"cmap": FIELD, "vmin": low, "vmax": max(high, low + 1e-12)}
-    image = axes.imshow(values, origin="lower", extent=extent, zorder=0.5, interpolation="nearest", **scale)
-    colour_bar(figure, image, axes, "planner's final field")
+    scale: dict[str, Any] = {"cmap": FIELD, "vmin": low, "vmax": high, "interpolation": "nearest"}
+    image = axes.imshow(values, origin="lower", extent=extent, zorder=0.5, **scale)
+    colour_bar(figure, image, axes, name)
+    return True

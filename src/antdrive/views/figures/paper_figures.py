@@ -1,4 +1,4 @@
-"""Figures in the style of papers: path length by iteration, number of ants and parameters."""
+"""Figures in the style of papers: maps with paths, path length by iteration, and heat maps."""
 
 from __future__ import annotations
 
@@ -10,49 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from antdrive.base.types import Floats, Ints
 from antdrive.runs.statistics.intervals import medians_by_world
-from antdrive.views.colours import INK, MUTED, LabelStyle, hexed, label_styles
-from antdrive.views.figures.canvas import colour_bar, sheet
+from antdrive.views.colours import MUTED, LabelStyle, hexed, label_styles
+from antdrive.views.figures.canvas import sheet
 
 if TYPE_CHECKING:
-    from antdrive.planners.plan import History, PlanResult, Query
+    from antdrive.planners.plan import PlanResult, Query
 
 POINTS = 80  # of a curve
 RESAMPLES = 500  # bootstrap resamples for the intervals
+MANY = 4  # curves of a panel whose bands are pale
 NO_PATH = 1e9  # represents infinity in medians
+ON_HEAT = "#1c1c1c", "#fefefe"  # text on the light and the dark cells of a heat map, the same on every page
 HIGHEST = 6.0  # upper end of the length axis, as a multiple of the optimum
-
-
-def history_figure(
-    histories: Mapping[str, Sequence[History]],
-    path: str | Path | None = None,
-    *,
-    optimum: float | None = None,
-    dpi: float = 160,
-) -> Figure:
-    """Draw the best path length so far by iteration for each planner: the median of its runs and their range."""
-    with sheet(path, (6.4, 4.0), dpi) as figure:
-        axes: Any = figure.add_subplot(label="history")
-        for (name, runs), (colour, _, dash) in zip(histories.items(), label_styles(list(histories)), strict=True):
-            longest = max(len(run) for run in runs)
-            best = np.array([np.pad(run.best, (0, longest - len(run)), mode="edge") for run in runs if len(run)])
-            best = np.where(np.isfinite(best), best, np.nan)
-            known = np.isfinite(best).all(axis=0)
-            iterations, best = np.arange(1, longest + 1)[known], best[:, known]
-            line: dict[str, Any] = {"color": hexed(colour), "ls": dash, "lw": 2.0, "drawstyle": "steps-post"}
-            axes.plot(iterations, np.median(best, axis=0), label=name, **line)
-            if len(runs) > 1:
-                band: dict[str, Any] = {"step": "post", "color": hexed(colour), "alpha": 0.15, "lw": 0}
-                axes.fill_between(iterations, best.min(axis=0), best.max(axis=0), **band)
-        if optimum is not None:
-            axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="optimum on this grid")
-        axes.set(xlabel="iteration", ylabel="best path so far [m]")
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axes.legend(loc="upper right")
-    return figure
 
 
 def maps_figure(
@@ -91,62 +63,19 @@ def maps_figure(
     return figure
 
 
-def ants_figure(
-    lengths: Mapping[int, Sequence[float]],
-    path: str | Path | None = None,
-    *,
-    planner: str,
-    optimum: float,
-    printed: Mapping[int, float] | None = None,
-    unit: str = "m",
-    dpi: float = 160,
-) -> Figure:
-    """Draw path length by number of ants: every seed, the mean and the paper's values."""
-    colour = label_styles([planner])[0].light
-    with sheet(path, (5.6, 4.0), dpi) as figure:
-        axes: Any = figure.add_subplot(label="lengths")
-        counts = sorted(lengths)
-        for count in counts:
-            axes.plot([count] * len(lengths[count]), lengths[count], "o", ms=4, color=colour, alpha=0.35, mew=0)
-        means = [float(np.mean(lengths[count])) for count in counts]
-        name = f"{planner}, mean of {len(lengths[counts[0]])} seeds"
-        axes.plot(counts, means, "-o", ms=6, color=colour, lw=2.0, label=name)
-        if printed:
-            known = sorted(printed)
-            values = [printed[count] for count in known]
-            axes.plot(known, values, "s--", color=hexed(INK), mfc="white", label="paper")
-        axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="optimum on this grid")
-        axes.set(xscale="log", xlabel="number of ants", ylabel=f"path length [{unit}]")
-        axes.set_xticks(counts, [str(count) for count in counts])
-        axes.minorticks_off()
-        axes.legend(loc="upper right")
-    return figure
-
-
-def sweep_figure(
-    pc: Sequence[float], pm: Sequence[float], lengths: Mapping[bool, Floats], path: str | Path | None = None
-) -> Figure:
-    """Draw the mean path length by crossover and mutation probability, with and without elitism."""
-    both = np.concatenate([np.ravel(values) for values in lengths.values()])
-    finite = both[np.isfinite(both)]
-    with sheet(path, (9.4, 3.9)) as figure:
-        for k, elitism in enumerate((True, False)):
-            title = "with elitism" if elitism else "without elitism"
-            axes: Any = figure.add_subplot(1, 2, k + 1, label=title)
-            values = np.asarray(lengths[elitism])
-            drawn = axes.imshow(
-                values, origin="lower", cmap="cividis_r", vmin=finite.min(), vmax=finite.max(), aspect="auto"
-            )
-            axes.set_xticks(range(len(pm)), [f"{p:g}" for p in pm])
-            axes.set_yticks(range(len(pc)), [f"{p:g}" for p in pc])
-            axes.set(xlabel="mutation probability Pm", ylabel="crossover probability Pc", title=title)
-            axes.grid(False)
-            for (i, j), value in np.ndenumerate(values):
-                dark = value > (finite.min() + finite.max()) / 2
-                words, colour = f"{value:.2f}" if math.isfinite(value) else "–", "white" if dark else hexed(INK)
-                axes.text(j, i, words, ha="center", va="center", fontsize=7.5, color=colour)
-        colour_bar(figure, drawn, figure.axes, "mean path length [cells]", shrink=0.85, aspect=26, pad=0.05)
-    return figure
+def draw_heat_map(
+    axes: Any, values: Floats, rows: Sequence[Any], columns: Sequence[Any], limits: tuple[float, float]
+) -> Any:
+    """Draw values (R, C) as labelled cells of a heat map with these colour limits; return it for a colour bar."""
+    low, high = limits
+    drawn = axes.imshow(values, origin="lower", cmap="cividis_r", vmin=low, vmax=high, aspect="auto")
+    for ticks, names in ((axes.set_yticks, rows), (axes.set_xticks, columns)):
+        ticks(range(len(names)), [f"{name:g}" if isinstance(name, float) else str(name) for name in names])
+    axes.grid(False)
+    for (i, j), value in np.ndenumerate(values):
+        text = f"{value:.3g}" if math.isfinite(value) else "–"
+        axes.text(j, i, text, ha="center", va="center", fontsize=7.5, color=ON_HEAT[int(value > (low + high) / 2)])
+    return drawn
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -157,60 +86,59 @@ class ConvergenceCurve:
     style: LabelStyle
     best: Sequence[Floats]  # best length so far by iteration, for each run [cells]; inf before the first path
     maps: Ints  # index of each run's map (N,)
-    # ant steps of each run (N,), spread evenly over its iterations; None: the axis counts iterations
-    steps: Floats | None
+    # effort of each run (N,) in the unit of `x`, spread evenly over its iterations; None: the axis counts iterations
+    spent: Floats | None
     optimum: float  # shortest length [cells]
-    printed: float | None  # the paper's length [cells], if any
+    printed: float | None = None  # the paper's length [cells], if any
+    x: str = "iteration"  # label of the axis
 
 
-def convergence_figure(
-    curves: Mapping[str, Sequence[ConvergenceCurve]], path: str | Path | None = None, *, single: bool = False
-) -> Figure:
+def convergence_figure(curves: Mapping[str, Sequence[ConvergenceCurve]], path: str | Path | None = None) -> Figure:
     """Draw the best length so far by iteration or ant steps, one panel per map."""
     across = 2 if len(curves) == 4 else min(len(curves), 3)
     with sheet(path, (3.9 * across, 3.2 * -(-len(curves) // across))) as figure:
         for k, (title, on_map) in enumerate(curves.items()):
-            axes: Any = figure.add_subplot(-(-len(curves) // across), across, k + 1, label=title)
-            spans = [_draw(axes, curve, number, on_map, single) for number, curve in enumerate(on_map)]
-            optimum = on_map[0].optimum
-            axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest")
-            counted = on_map[0].steps is not None
-            axes.set(
-                title=title, xlabel="million ant steps" if counted else "iteration", ylabel="best path so far [cells]"
-            )
-            low = min([optimum, *(span[0] for span in spans)])
-            top = min(max(span[1] for span in spans), HIGHEST * optimum)
-            axes.set_ylim(low - 0.06 * (top - low) - 0.1, top + 0.06 * (top - low) + 0.1)
-            axes.set_xlim(left=0.0)
-            axes.legend(loc="best", fontsize=7)
+            axes: Any = figure.add_subplot(-(-len(curves) // across), across, k + 1, label=title, title=title)
+            draw_convergence(axes, on_map)
+            axes.set_ylabel("best path so far [cells]")
     return figure
 
 
-def _draw(
-    axes: Any, curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool
-) -> tuple[float, float]:
+def draw_convergence(axes: Any, curves: Sequence[ConvergenceCurve]) -> None:
+    """Draw the curves of one panel: the median over runs and its interval over maps."""
+    spans = [_draw(axes, curve, number, curves) for number, curve in enumerate(curves)]
+    optimum = curves[0].optimum
+    axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest")
+    low = min([optimum, *(span[0] for span in spans)])
+    top = min(max(span[1] for span in spans), HIGHEST * optimum)
+    axes.set_ylim(low - 0.06 * (top - low) - 0.02 * optimum, top + 0.06 * (top - low) + 0.02 * optimum)
+    axes.set_xlim(left=0.0)
+    axes.set_xlabel(curves[0].x)
+    axes.legend(loc="best", fontsize=7)
+
+
+def _draw(axes: Any, curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve]) -> tuple[float, float]:
     """Draw a curve and return the smallest and the largest length to show."""
     colour, dash = curve.style.light, curve.style.dash
-    scale = 1.0 if curve.steps is None else 1e-6
-    if single:
-        run = _typical(curve)
-        taken = None if curve.steps is None else curve.steps[run : run + 1]
-        x = _grid([curve.best[run]], taken)
-        middle = _sampled([curve.best[run]], taken, x)[0]
-        low = high = middle
-    else:
-        x = _grid(curve.best, curve.steps)
-        values = np.minimum(_sampled(curve.best, curve.steps, x), NO_PATH)
-        alone = len(set(curve.maps.tolist())) == 1
-        maps = np.arange(len(values)) if alone else curve.maps
-        middle = np.median(values, axis=0)
-        low, high = np.array(medians_by_world(values, maps, RESAMPLES)).T
+    x = _grid(curve.best, curve.spent)
+    values = np.minimum(_sampled(curve.best, curve.spent, x), NO_PATH)
+    alone = len(set(curve.maps.tolist())) == 1
+    maps = np.arange(len(values)) if alone else curve.maps
+    middle = np.median(values, axis=0)
+    low, high = np.array(medians_by_world(values, maps, RESAMPLES)).T
     known = middle < NO_PATH / 10
-    x = x * scale
     axes.plot(x[known], middle[known], color=colour, ls=dash, lw=1.8, label=curve.name, drawstyle="steps-post")
-    if not single and len(curve.best) > 1:
+    if len(curve.best) > 1:
         ceiling = np.minimum(high, HIGHEST * 2 * curve.optimum)
-        axes.fill_between(x[known], low[known], ceiling[known], step="post", color=colour, alpha=0.22, lw=0)
+        axes.fill_between(
+            x[known],
+            low[known],
+            ceiling[known],
+            step="post",
+            color=colour,
+            alpha=0.22 if len(among) < MANY else 0.08,
+            lw=0,
+        )
     if curve.printed is not None and len(x):
         label = "paper" if all(other.printed is None for other in among[:number]) else None
         axes.plot(x[-1], curve.printed, "s", ms=5, color=colour, mfc="white", clip_on=False, zorder=4, label=label)
@@ -219,27 +147,20 @@ def _draw(
     return min(finite), max(finite)
 
 
-def _typical(curve: ConvergenceCurve) -> int:
-    """Return the run with the median path length on the first map."""
-    on_first = [k for k in range(len(curve.best)) if curve.maps[k] == curve.maps[0]]
-    ends = sorted(on_first, key=lambda k: float(curve.best[k][-1]) if len(curve.best[k]) else math.inf)
-    return ends[(len(ends) - 1) // 2]
-
-
-def _grid(best: Sequence[Floats], steps: Floats | None) -> Floats:
-    """Return the sample positions (K,) of the runs' curves: iterations or ant steps."""
-    if steps is None:
+def _grid(best: Sequence[Floats], spent: Floats | None) -> Floats:
+    """Return the sample positions (K,) of the runs' curves: iterations or effort."""
+    if spent is None:
         longest = max(len(run) for run in best)
         return np.unique(np.linspace(1, longest, min(longest, POINTS)).round())
-    end = float(np.median(steps))
+    end = float(np.median(spent))
     return np.linspace(end / POINTS, end, POINTS)
 
 
-def _sampled(best: Sequence[Floats], steps: Floats | None, x: Floats) -> Floats:
+def _sampled(best: Sequence[Floats], spent: Floats | None, x: Floats) -> Floats:
     """Return the best length of each run at `x` (N, K); inf before the first path."""
     rows = []
     for k, run in enumerate(best):
-        each = 1.0 if steps is None else float(steps[k]) / max(1, len(run))
+        each = 1.0 if spent is None else float(spent[k]) / max(1, len(run))
         place = np.minimum(np.floor(x / each + 1e-9).astype(int), len(run)) - 1
         rows.append(np.where(place >= 0, run[place] if len(run) else math.inf, math.inf))
     return np.array(rows)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,11 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from antdrive.base.types import Floats
 from antdrive.views.colours import BAD, MUTED, ROUTE, SHELL, START, hexed
-from antdrive.views.figures.canvas import colour_bar, draw_title, endings, frame_map, legend_above, map_size, sheet
-from antdrive.views.figures.map_chart import FIELD, draw_coverage, draw_field, draw_legend, draw_map
-from antdrive.views.figures.paper_figures import history_figure
+from antdrive.views.figures.canvas import draw_title, frame_map, legend_above, map_size, sheet
+from antdrive.views.figures.map_chart import draw_coverage, draw_field, draw_legend, draw_map
 from antdrive.views.scene import Scene
 
 if TYPE_CHECKING:
@@ -27,10 +24,6 @@ if TYPE_CHECKING:
     from antdrive.worlds.world import Task
 
 
-#: File stems of `plan_figures`, by figure.
-FILES = {"plan": "plan", "tour": "tour", "history": "history", "bars": "field-bars", "contours": "field-contours"}
-#: Bars per side. In a larger field each bar shows the maximum of several cells.
-MAX_BARS = 40
 #: Characters of a reason per inch, and the height of its lines [inches].
 LETTERS, LINE = 13.0, 0.165
 BESIDE = 2.9  # width of a legend beside the map [inches]
@@ -82,9 +75,9 @@ def plan_figure(
     with sheet(path, (wide_all, high + above + (0.4 + LINE * len(below) if below else 0.0)), dpi) as figure:
         areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
         chart = figure.add_subplot(areas[0, 0], label="map")
-        if plan.field is not None:
-            draw_field(figure, chart, grid, plan.field)
-        draw_map(chart, scene, floor=plan.field is None)
+        name = "pheromone" if "ant" in plan.work_unit else "planner's field"
+        painted = plan.field is not None and draw_field(figure, chart, grid, plan.field, name)
+        draw_map(chart, scene, floor=not painted)
         handles: list[Any] = draw_coverage(chart, covered, high / (shown[3] - shown[1])) if covered else []
         if len(plan.cells):
             handles += chart.plot(*cells.T, ".", ms=3.4, color=hexed(ROUTE), label="planned cells", zorder=5)
@@ -126,87 +119,3 @@ def _note_below(plan: PlanResult, *, mapped: bool) -> str:
     if not len(plan.cells):
         return plan.reason or plan.status.value
     return "" if mapped else FIRST
-
-
-def plan_figures(
-    task: Task,
-    grid: Grid,
-    plan: PlanResult,
-    robot: RobotSpec,
-    folder: Path,
-    *,
-    name: str,
-    suffixes: Sequence[str],
-    mapped: bool = True,
-) -> dict[str, Path]:
-    """Draw every figure of a plan: path, path over the field, history, field as bars and field as contours."""
-    paths: dict[str, Path] = {}
-    bare = dataclasses.replace(plan, field=None, history=type(plan.history)())
-    for suffix, end in endings(suffixes):
-        files = {key: folder / f"{stem}{suffix}" for key, stem in FILES.items()}
-        plan_figure(task, grid, plan, robot, files["plan"], mapped=mapped)
-        drawn = ["plan"]
-        if len(plan.history):
-            plan_figure(task, grid, bare, robot, files["tour"], mapped=mapped)
-            history_figure({name: [plan.history]}, files["history"])
-            drawn += ["tour", "history"]
-        if plan.field is not None:
-            bars_figure(grid, plan.field, files["bars"])
-            contours_figure(task, grid, plan, robot, files["contours"], mapped=mapped)
-            drawn += ["bars", "contours"]
-        paths |= {key + end: files[key] for key in drawn}
-    return paths
-
-
-def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dpi: float = 160) -> Figure:
-    """Draw a planner's field (R, C) as three-dimensional bars on the free cells."""
-    step = max(1, math.ceil(max(grid.shape) / MAX_BARS))
-    values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
-    rows, cols = (-(-side // step) for side in grid.shape)
-    padded = np.full((rows * step, cols * step), -np.inf)
-    padded[: grid.shape[0], : grid.shape[1]] = np.where(np.isfinite(values), values, -np.inf)
-    high = padded.reshape(rows, step, cols, step).max(axis=(1, 3))
-    r, c = np.nonzero(np.isfinite(high))
-    heights = np.minimum(high[r, c], np.quantile(high[r, c], 0.998)) if len(r) else np.empty(0)
-    base = min(0.0, float(heights.min(initial=0.0)))
-    level = (heights - base) / max(float(heights.max(initial=0.0)) - base, 1e-300)
-    side = step * grid.cell
-    with sheet(path, (7.2, 5.6), dpi) as figure:
-        axes: Any = figure.add_subplot(projection="3d", label="field")
-        x, y = grid.origin[0] + c * side - grid.cell / 2, grid.origin[1] + r * side - grid.cell / 2
-        wide, tall = 0.92 * side, np.maximum(heights - base, 1e-12)
-        axes.bar3d(x, y, base, wide, wide, tall, color=FIELD(0.25 + 0.75 * level), shade=True, lw=0)
-        axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="planner's field")
-        axes.view_init(elev=38, azim=-62)
-        axes.set_box_aspect((cols, rows, 0.55 * max(rows, cols)))
-        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-            axis.set_pane_color((1, 1, 1, 0))
-    return figure
-
-
-def contours_figure(
-    task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path | None = None, *, mapped: bool = True
-) -> Figure:
-    """Draw the contours of a planner's field on the map, with the planned path."""
-    scene = Scene.planned(task, robot, grid, mapped=mapped)
-    assert plan.field is not None
-    values = np.where(grid.free, np.asarray(plan.field, dtype=np.float64), np.nan)
-    x = grid.origin[0] + grid.cell * np.arange(grid.shape[1])
-    y = grid.origin[1] + grid.cell * np.arange(grid.shape[0])
-    finite = values[np.isfinite(values)]
-    with sheet(path, (6.6, 5.9)) as figure:
-        axes: Any = figure.add_subplot(label="map")
-        if len(finite) and finite.max() > finite.min():
-            levels = np.unique(np.quantile(finite, np.linspace(0.6, 0.998, 9)))
-            if len(levels) > 1:
-                drawn = axes.contourf(x, y, values, levels=levels, cmap=FIELD, extend="both", zorder=0.6)
-                axes.contour(x, y, values, levels=levels, colors="#123f7a", linewidths=0.35, alpha=0.6, zorder=0.7)
-                colour_bar(figure, drawn, axes, "planner's field", format="%.2g")
-        draw_map(axes, scene, floor=False)
-        line = grid.xy(plan.line) if plan.solved else np.empty((0, 2))
-        frame_map(axes, scene.map_bounds(line))
-        handles: list[Any] = []
-        if len(line):
-            handles = axes.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
-        draw_legend(axes, handles, scene)
-    return figure
