@@ -70,7 +70,7 @@ def _run(folder: Path) -> Path:
     if not (home / "result.json").exists():
         home.mkdir(exist_ok=True)
         done = run(Scenario.of("empty", "astar", noise=1.0, time_limit=2.0))
-        write_run(done, home, "antdrive run empty", figures=False)
+        write_run(done, home, "antdrive run empty", formats=None)
     for file in ("rollout.npz", "result.json"):
         shutil.copyfile(home / file, folder / file)
     return folder / "rollout.npz"
@@ -164,7 +164,7 @@ KINDS = {
     "robot": Kind(_text("robot.yaml", _catalogue("robots", "jackal")), ("robots show FILE", f"run empty -r FILE {DRIVE}")),
     "campaign": Kind(_text("campaign.yaml", CAMPAIGN), ("sweep FILE --dry-run -o FOLDER/out",)),
     "suite": Kind(
-        _text("a.drive.yaml", SUITE), ("check FILE --film never -j 1 --only nothing", "accept FILE --film never -j 1 --only none")
+        _text("a.drive.yaml", SUITE), ("check FILE -j 1 --only nothing", "accept FILE -j 1 --only none")
     ),
     "urdf": Kind(
         _text("cart.urdf", (ROOT / "examples" / "bridges" / "cart.urdf").read_text()), ("robots import FILE -o FOLDER/x.yaml",)

@@ -279,7 +279,7 @@ def in_fork(folder: Path, patch: Callable[[], None] | None) -> Tests:
         logs_only()
         if patch:
             patch()
-        pytest.main(["-q", *PLUGINS, "--drive-film=never", f"--drive-results={folder / 'results'}", str(folder)])
+        pytest.main(["-q", *PLUGINS, f"--drive-results={folder / 'results'}", str(folder)])
 
     process = multiprocessing.get_context("fork").Process(target=work)
     process.start()

@@ -69,7 +69,7 @@ def with_pytest(
     """
     out = folder / "tests.json"
     out.unlink(missing_ok=True)
-    command = [sys.executable, *flags, "-m", "pytest", "-q", *PLUGINS, "--drive-film=never", *words]
+    command = [sys.executable, *flags, "-m", "pytest", "-q", *PLUGINS, *words]
     env = environment(out, env)
     done = subprocess.run(command, cwd=cwd or folder, env=env, capture_output=True, text=True, check=False)
     if not out.exists():
@@ -81,7 +81,7 @@ def with_pytest(
 
 def with_check(folder: Path, *words: str, env: Mapping[str, str] | None = None) -> Tests:
     """Run `antdrive check` on the suites of a folder. Return the results by test."""
-    command = [sys.executable, "-m", "antdrive", "check", ".", "--json", "--film", "never", *words]
+    command = [sys.executable, "-m", "antdrive", "check", ".", "--json", *words]
     env = environment(None, env)
     done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False)
     tests = json.loads(done.stdout)["tests"]

@@ -45,7 +45,7 @@ def run(words, folder, env):
 
 @pytest.mark.slow
 def test_its_tests_pass_and_use_every_baseline(checkout, variables):
-    done = run(["pytest", "-q", "--drive-strict", "--drive-film=never", "--junitxml=junit.xml"], checkout, variables)
+    done = run(["pytest", "-q", "--drive-strict", "--junitxml=junit.xml"], checkout, variables)
     assert done.returncode == 0, done.stdout
     drives = len(list((checkout / "baselines").rglob("*.json")))
     assert f"{drives} of {drives} drives passed" in done.stdout
@@ -62,7 +62,7 @@ def test_its_tests_pass_and_use_every_baseline(checkout, variables):
 def test_a_fault_of_the_planner_fails_its_tests(checkout, variables):
     planner = checkout / "courier.py"
     planner.write_text(planner.read_text().replace("if not moves[here] >> k & 1:", "if not query.grid.free[cell]:"))
-    words = ["antdrive", "check", "office.drive.yaml", "--only", "office", "--film", "never", "--json", "-j", "1"]
+    words = ["antdrive", "check", "office.drive.yaml", "--only", "office", "--json", "-j", "1"]
     done = run(words, checkout, variables)
     assert done.returncode == 1, done.stdout
     (test,) = json.loads(done.stdout)["tests"]
@@ -88,7 +88,7 @@ def test_every_command_of_the_page_works(checkout, variables):
     assert re.search(r"touched obstacles\[\d+\] at .*; the robot was at .* at t = ", done.stdout)
     assert done.stdout.count("2 passed in") == 2
     results = checkout.parent / "my-robot" / "results" / "my" / "hall-0"
-    assert (results / "then-and-now.mp4").stat().st_size > 10_000
+    assert (results / "drive.html").stat().st_size > 10_000
     assert (checkout.parent / "my-robot" / "report.html").exists()
     everything, _, rest = rest.partition("\n")
     assert everything == "pytest --drive-strict", "which the first test here runs"

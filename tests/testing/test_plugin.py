@@ -5,10 +5,8 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 import xml.etree.ElementTree
 from pathlib import Path
-from types import SimpleNamespace
 
 import numba
 import pybullet  # noqa: F401
@@ -45,12 +43,12 @@ def pictures():
 
 @pytest.fixture
 def project(pytester, monkeypatch, pictures):
-    """A folder with a suite; results go beside it, without films."""
+    """A folder with a suite; results go beside it."""
     if not pictures:
         monkeypatch.setattr(RUN_FIGURES + "overview", lambda rollout, path: Path(path).touch())
         monkeypatch.setattr(PLAN_FIGURES + "plan_figure", lambda task, grid, plan, robot, path: Path(path).touch())
     monkeypatch.setenv("XDG_CACHE_HOME", str(pytester.path / "cache"))
-    monkeypatch.setenv("PYTEST_ADDOPTS", "--drive-film=never")
+    monkeypatch.setenv("PYTEST_ADDOPTS", "")
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # loading the others takes longer than a drive
     monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
     pytester.makefile(".drive.yaml", a=SUITE)
@@ -157,7 +155,7 @@ def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted):
     ])  # fmt: skip
     written = sorted(path.name for path in (folder / "a" / "clear-0").iterdir())
     assert all(path.stat().st_size > 10_000 for path in (folder / "a" / "clear-0").glob("*.png"))
-    assert written == ["commands.txt", "overview.png", "result.json", "rollout.npz", "then-and-now.png"]
+    assert written == ["commands.txt", "drive.html", "overview.png", "result.json", "rollout.npz"]
     accepted.makefile(".drive.yaml", a=SUITE)
     accepted.runpytest(*PLUGIN, "-k", "clear", "--drive-results", "res").assert_outcomes(passed=1, deselected=1)
     assert not (folder / "a" / "clear-0").exists(), "what an earlier run wrote about a test that passes now is removed"
@@ -387,27 +385,3 @@ def test_collecting_loads_no_physics_and_no_compiler(project):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
-
-
-def test_the_summary_says_which_failed_drives_have_no_film(project, monkeypatch):
-    """One film is allowed, and a file stands for it; the suite fails three times, for want of baselines."""
-
-    def film(rollout, path, **_):
-        path.write_text("a film")
-        return SimpleNamespace(path=path)
-
-    monkeypatch.setattr(importlib.import_module("antdrive.views.film.video"), "film", film)
-    monkeypatch.setattr("antdrive.views.artefacts.MOST_FILMS", 1)
-    monkeypatch.setenv("PYTEST_ADDOPTS", "")
-    project.makefile(".drive.yaml", a=SUITE.replace("clear: {}", "clear: {seeds: [0, 1, 2]}"))
-    (project.path / "temporary").mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(project.path / "temporary"))
-    done = project.runpytest(*PLUGIN, "--drive-results", "results", "-k", "clear")
-    done.assert_outcomes(failed=3, deselected=1)
-    assert [path.parent.name for path in (project.path / "results").rglob("film.mp4")] == ["clear-0"]
-    done.stdout.fnmatch_lines([
-        "film: */results/a/clear-0/film.mp4",
-        "film: omitted after 10 films; make it with antdrive check 'a.drive.yaml::clear[[]1[]]'",
-        "2 more failed drives have no film; repeat a drive to film it, or use --drive-film always to film all",
-    ])  # fmt: skip
-    assert not list((project.path / "temporary").glob("antdrive-films-*"))

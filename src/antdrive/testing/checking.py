@@ -10,7 +10,7 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.base.version import require_physics
 from antdrive.runs.pool import cores
 from antdrive.runs.suites import scenario_of, select
-from antdrive.runs.suites.suite import SUFFIX, LogCase
+from antdrive.runs.suites.suite import SUFFIX
 from antdrive.sim.scenario import Scenario
 from antdrive.testing.evaluation import CheckResult, Update, evaluate_cases
 from antdrive.testing.python_tests import drive_python_tests, is_module
@@ -36,7 +36,7 @@ def evaluate_tests(
         only: a pattern with * and ? for the tests' names
         jobs: number of processes; None: one per core
         update: baselines to write
-        results: destination of logs, figures and films
+        results: destination of logs, pages and figures
         choose: chooses the margin `auto`, before processes start
         report: called with each result
         progress: called with the completed fraction of the suites' tests
@@ -56,7 +56,7 @@ def evaluate_tests(
     if not suites:
         return outcomes, unused
     cases = select(suites, only)
-    drives = [case for case in cases if not isinstance(case, LogCase)]
+    drives = [case for case in cases if case.entry.log is None]
     if drives:
         require_physics()  # before any work
     for case in drives:

@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import math
 import shlex
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -26,7 +25,7 @@ from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
 from antdrive.sim.rerun import UNSTEADY, fingerprint, fingerprint_of, is_unsteady
 from antdrive.sim.scenario import Scenario
-from antdrive.views.artefacts import MOST_FILMS, Results, remove_artefacts, write_artefacts, write_traceback
+from antdrive.views.artefacts import Results, remove_artefacts, write_artefacts, write_traceback
 
 #: Baselines to write: none, only missing ones, or all.
 Update: TypeAlias = Literal["", "new", "all"]
@@ -54,7 +53,6 @@ class CheckResult:
         accepted: change to the baseline: written, renewed, unchanged, or empty
         commands: commands that repeat the test
         files: written files by name
-        unfilmed: whether the test failed and has no film because `MOST_FILMS` exist
         metrics: the drive's finite metrics; empty if the robot did not drive
         digest: `Rollout.drive_digest`; empty if the robot did not drive
         wall_s: duration of the test [s]
@@ -72,7 +70,6 @@ class CheckResult:
     accepted: str = ""
     commands: tuple[str, ...] = ()
     files: dict[str, str] = field(default_factory=dict)
-    unfilmed: bool = False
     metrics: dict[str, float] = field(default_factory=dict)
     digest: str = ""
     wall_s: float = 0.0
@@ -83,8 +80,6 @@ class CheckResult:
         lines = [*self.faults, *self.notes, *self.details]
         lines += [f"{'repeat:' if k == 0 else '       '} {command}" for k, command in enumerate(self.commands)]
         lines += [f"{name}: {path}" for name, path in self.files.items()]
-        if self.unfilmed:
-            lines.append(f"film: omitted after {MOST_FILMS} films; make it with {self.commands[0]}")
         return "\n".join(lines)
 
     def lines(self, noted: set[str]) -> list[str]:
@@ -114,7 +109,7 @@ class Criteria:
     commands: tuple[str, ...]  # commands that repeat the test
     accept: str  # command that accepts the drive
     update: Update = ""  # baselines to write
-    folder: Path | None = None  # for the test's logs, figures and films; None: write nothing
+    folder: Path | None = None  # for the test's log, page and figure; None: write nothing
     results: Results | None = None  # selection of what to write; None: nothing
     again: Callable[[], str] | None = None  # returns `fingerprint` of the test's scenario in any process
 
@@ -129,9 +124,9 @@ class Criteria:
         if accepted in ("written", "renewed") and self._is_unsteady(run):
             evaluation = dataclasses.replace(evaluation, notes=(*evaluation.notes, UNSTEADY))
         details = [] if evaluation.passed else [*explain(run, baseline, self._elsewhere)]
-        files, unfilmed = dict[str, str](), False
+        files = dict[str, str]()
         try:
-            files, unfilmed = self._written(run, evaluation, baseline)
+            files = self._written(run, evaluation, baseline)
         except Exception as error:  # drawing an invalid plan can raise any exception
             if evaluation.passed:
                 raise
@@ -151,7 +146,6 @@ class Criteria:
             accepted=accepted,
             commands=self.commands,
             files=files,
-            unfilmed=unfilmed,
             metrics={} if rollout is None else {name: x for name, x in run.metrics.items() if not math.isnan(x)},
             digest="" if rollout is None else rollout.drive_digest,
             wall_s=wall + (rollout.record.times.drive_wall_s if rollout else 0.0) + time.perf_counter() - started,
@@ -217,19 +211,14 @@ class Criteria:
             accepted = Baseline.of(run, self.name).renew(path)
         return Evaluation(tuple(faults)), accepted
 
-    def _written(self, run: Run, evaluation: Evaluation, baseline: Baseline | None) -> tuple[dict[str, str], bool]:
-        """Write a test's files. Return them by name, and whether a film was omitted."""
+    def _written(self, run: Run, evaluation: Evaluation, baseline: Baseline | None) -> dict[str, str]:
+        """Write a test's files and return them by name."""
         if self.folder is None or self.results is None:
-            return {}, False
+            return {}
         remove_artefacts(self.folder)
-        failed, drove, films = not evaluation.passed, run.rollout is not None, self.results.films
-        filmed = drove and self.results.should_film(failed=failed)
-        if not (failed or films == "always"):
-            return {}, False
-        files = write_artefacts(
-            run, self.folder, baseline, film=filmed, faults=evaluation.faults, commands=self.commands
-        )
-        return files, drove and films == "failed" and not filmed
+        if evaluation.passed and not self.results.keep:
+            return {}
+        return write_artefacts(run, self.folder, baseline, faults=evaluation.faults, commands=self.commands)
 
 
 def _criteria_of(case: SuiteCase, update: Update, results: Results | None) -> Criteria:
@@ -257,7 +246,7 @@ def evaluate_case(case: SuiteCase, *, update: Update = "", results: Results | No
     Args:
         case: the test
         update: baselines to write
-        results: destination of logs, figures and films; None: write nothing
+        results: destination of logs, pages and figures; None: write nothing
 
     Raises:
         InputError: the suite, a file that it names, or the baseline is wrong.
@@ -299,16 +288,8 @@ def evaluate_cases(
         cases: the tests
         jobs: number of processes
         update: baselines to write
-        results: destination of logs, figures and films; None: write nothing
+        results: destination of logs, pages and figures; None: write nothing
     """
-    with tempfile.TemporaryDirectory(prefix="antdrive-films-") as places:
-        limited = results and dataclasses.replace(results, places=Path(places))
-        yield from _evaluate_in_turn(cases, jobs, update, limited)
-
-
-def _evaluate_in_turn(
-    cases: Sequence[SuiteCase], jobs: int, update: Update, results: Results | None
-) -> Iterator[CheckResult]:
     if jobs == 1 or len(cases) == 1:
         for case in cases:
             yield _evaluate_or_fail(case, update, results)

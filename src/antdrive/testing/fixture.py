@@ -15,7 +15,7 @@ from antdrive.robots import RobotSpec, list_robots
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.nearest import first_contact, nearest_of
 from antdrive.runs.suites.suite import BASELINES
-from antdrive.sim.log.certificate import certify, in_metres
+from antdrive.sim.log.certificate import at_least, certify
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
@@ -57,7 +57,7 @@ class DriveFixture:
         address: pytest's node id of the test, relative to its rootdir
         repeat: the test's name in commands, if it differs from the address
         update: baselines to write
-        results: destination of logs, figures and films; None: write nothing
+        results: destination of logs, pages and figures; None: write nothing
         report: called with the result of each drive
     """
 
@@ -226,7 +226,7 @@ def assert_collision_free(run: Run | Rollout, clearance: float = 0.0) -> None:
     if certificate.bound < clearance:
         nearest = nearest_of(rollout)
         raise AssertionError(
-            f"clearance: {in_metres(certificate.bound)} is proved, expected {clearance:g} m; nearest to {nearest.thing}, "
+            f"clearance: {at_least(certificate.bound)} is proved, expected {clearance:g} m; nearest to {nearest.thing}, "
             f"{nearest.place}"
         )
 

@@ -24,8 +24,6 @@ SUFFIX = ".drive.yaml"
 WORKER_KEY = "antdrive_unused"  # key for unused baselines reported by xdist workers
 
 _RESULTS = pytest.StashKey[list[Any]]()  # results of a test's drives
-FILMS_KEY = "antdrive_films"  # key for the film counting folder passed to xdist workers
-_FILM_COUNT = pytest.StashKey[str]()  # folder in which films of failed drives are counted
 _UNUSED = pytest.StashKey[set[str]]()  # unused baselines
 _COMPILED = pytest.StashKey[bool]()  # whether the kernels are compiled
 _LISTENER = pytest.StashKey["_Listener"]()
@@ -40,11 +38,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--drive-results",
         metavar="FOLDER",
-        help="folder for logs, figures and films of failed drives (default: user cache)",
+        help="folder for logs, pages and figures of failed drives (default: user cache)",
     )
-    group.addoption(
-        "--drive-film", choices=("never", "failed", "always"), default="failed", help="drives to film (default: failed)"
-    )
+    group.addoption("--drive-keep", action="store_true", help="write results of passed drives, too")
     group.addoption(
         "--drive-plan-limit", metavar="SECONDS", help="limit on the time of a plan or replan (default: 600, or off)"
     )
@@ -190,36 +186,12 @@ def update_of(config: pytest.Config) -> Update:
 
 
 def results_of(config: pytest.Config) -> Results:
-    """Return where this pytest run writes logs, figures and films."""
+    """Return where this pytest run writes logs, pages and figures."""
     from antdrive.views.artefacts import Results, cached_results
 
     given = config.getoption("drive_results")
     folder = config.invocation_params.dir / given if given else cached_results(config.rootpath)
-    return Results(folder, config.getoption("drive_film"), Path(counting_folder(config)), config.rootpath)
-
-
-def counting_folder(config: pytest.Config) -> str:
-    """Return the folder in which all processes of this pytest run count films of failed drives."""
-    if _FILM_COUNT not in config.stash:
-        import tempfile
-
-        shared = getattr(config, "workerinput", {}).get(FILMS_KEY)
-        config.stash[_FILM_COUNT] = shared or tempfile.mkdtemp(prefix="antdrive-films-")
-    return config.stash[_FILM_COUNT]
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_configure_node(node: Any) -> None:
-    """Pass the film counting folder to an xdist worker."""
-    node.workerinput[FILMS_KEY] = counting_folder(node.config)
-
-
-def pytest_unconfigure(config: pytest.Config) -> None:
-    """Remove the film counting folder."""
-    if _FILM_COUNT in config.stash and not hasattr(config, "workerinput"):
-        import shutil
-
-        shutil.rmtree(config.stash[_FILM_COUNT], ignore_errors=True)
+    return Results(folder, config.getoption("drive_keep"), config.rootpath)
 
 
 @pytest.hookimpl(tryfirst=True)

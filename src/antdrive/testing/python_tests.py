@@ -42,7 +42,7 @@ def drive_python_tests(
         words: files, FILE.py::test, and folders, of which other tests are left out
         only: a pattern with * and ? for the test's name
         update: baselines to write
-        results: destination of logs, figures and films
+        results: destination of logs, pages and figures
 
     Raises:
         InputError: pytest is not installed or cannot run, or a file has no such test.
@@ -57,7 +57,7 @@ def drive_python_tests(
     import pytest
 
     options = ["-p", PLUGIN, "--continue-on-collection-errors", *UPDATES[update]]
-    options += ["--drive-film", results.films, f"--drive-results={results.folder.resolve()}"]
+    options += [f"--drive-results={results.folder.resolve()}", *["--drive-keep"] * results.keep]
     if importlib.util.find_spec("xdist") is not None:
         options += ["-n", "0"]  # results stay in this process
     drives = _Drives(only)

@@ -32,7 +32,6 @@ def properties(result: CheckResult) -> list[tuple[str, str]]:
         "baseline": result.accepted,
         "results": str(Path(next(iter(result.files.values()))).parent) if result.files else "",
         "command": result.commands[0] if result.commands else "",
-        "film": "none" if result.unfilmed else "",
     }
     return [(f"drive.{key}", text) for key, text in facts.items() if text]
 
@@ -65,31 +64,21 @@ def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bo
             yield f"{drive['test']}: {drive['notes']}"
         if drive.get("results") and drive["passed"] == "false":
             yield f"results: {drive['results']}"
-    unfilmed = sum(drive.get("film") == "none" for drive in drives)
-    if unfilmed:
-        yield films_omitted(unfilmed, "--drive-film always")
     yield from unused_lines(unused, strict)
 
 
 def summary_lines(results: Sequence[CheckResult], unused: Sequence[str], strict: bool) -> Iterator[str]:
-    """Yield the unused baselines, and the numbers of passed tests and of missing films, as lines."""
+    """Yield the unused baselines and the number of passed tests, as lines."""
     yield from unused_lines(unused, strict)
     passed = [result for result in results if result.passed]
     better = sum(bool(result.gains) for result in passed)
     gained = f"; {better} better than the baseline: renew it with antdrive accept" if better else ""
     yield f"{len(passed)} of {len(results)} passed{gained}"
-    if unfilmed := sum(result.unfilmed for result in results):
-        yield films_omitted(unfilmed, "--film always")
 
 
 def unused_lines(unused: Sequence[str], strict: bool) -> Iterator[str]:
     """Return one line per unused baseline."""
     return (f"{'FAILED: ' if strict else ''}unused baseline: {path}; remove it" for path in unused)
-
-
-def films_omitted(count: int, option: str) -> str:
-    """Return a line about failed drives without a film, and how to make the films."""
-    return f"{count} more failed drives have no film; repeat a drive to film it, or use {option} to film all"
 
 
 def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""Artefacts of a test: log, figures, film beside the baseline, and commands to repeat it."""
+"""Artefacts of a test: log, page beside the baseline, overview, and commands to repeat it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import traceback
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -20,24 +19,16 @@ from antdrive.base.atomic import write_text
 from antdrive.base.files import write_json
 from antdrive.base.kernel_cache import user_cache, writable
 from antdrive.runs.suites.baseline import Baseline
-from antdrive.runs.suites.evaluation import divergence
 from antdrive.runs.suites.suite import SUFFIX
 from antdrive.sim.log.certificate import closed_form_clearance
-from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.log.timeline import speeds
+from antdrive.sim.log.rollout import SENSED, Rollout
 from antdrive.sim.pipeline import Run
-
-#: Tests to film.
-Films: TypeAlias = Literal["never", "failed", "always"]
 
 #: All files of a test's artefacts.
 FILES = (
-    *("result.json", "commands.txt", "rollout.npz", "certificate.json", "overview.png"),
-    *("then-and-now.png", "then-and-now.mp4", "film.mp4", "traceback.txt"),
+    *("result.json", "commands.txt", "rollout.npz", "certificate.json"),
+    *("drive.html", "overview.png", "traceback.txt"),
 )
-FILM_SIZE, FILM_FPS = (960, 540), 20.0
-MOST_FILMS = 10  # of failed tests in one session; a film takes longer than most drives
-FILM_LENGTH = 12.0  # films of longer drives are sped up to this length [s]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,9 +36,7 @@ class Results:
     """Folder and extent of results."""
 
     folder: Path  # of all results, with a folder per test
-    films: Films = "failed"  # tests to film
-    # folder in which all processes count the films of failed tests; None: unlimited
-    places: Path | None = None
+    keep: bool = False  # whether passed tests leave results, too
     # the project's folder, whose structure the results mirror
     root: Path = dataclasses.field(default_factory=Path.cwd)
 
@@ -60,21 +49,6 @@ class Results:
             parts = (f"{portable_name(home.name or 'root')}-{zlib.crc32(os.fsencode(home)):08x}",)
         stem = file.name.removesuffix(SUFFIX) if file.name.endswith(SUFFIX) else file.stem
         return self.folder.joinpath(*map(portable_name, (*parts, stem, name)))
-
-    def should_film(self, *, failed: bool) -> bool:
-        """Return whether to film a test. Of the failed tests, only the first `MOST_FILMS` are filmed; each claims a place."""
-        if self.films != "failed":
-            return self.films == "always"
-        return failed and (self.places is None or any(_claim(self.places / str(k)) for k in range(MOST_FILMS)))
-
-
-def _claim(place: Path) -> bool:
-    """Claim a place and return whether this process is the first."""
-    try:
-        place.touch(exist_ok=False)
-    except OSError:
-        return False
-    return True
 
 
 def portable_name(name: str) -> str:
@@ -100,10 +74,11 @@ def cached_results(root: Path) -> Path:
 
 
 def write_artefacts(
-    run: Run, folder: Path, baseline: Baseline | None, *, film: bool, faults: Sequence[str], commands: Sequence[str]
+    run: Run, folder: Path, baseline: Baseline | None, *, faults: Sequence[str], commands: Sequence[str]
 ) -> dict[str, str]:
     """Replace a test's artefacts and return the files by kind."""
     from antdrive.views.figures.run_figures import draw_run
+    from antdrive.views.viewer.drive_page import write_page
 
     remove_artefacts(folder)
     rollout = run.rollout
@@ -111,7 +86,9 @@ def write_artefacts(
     files["overview"] = str(folder / "overview.png")
     draw_run(run, files["overview"])
     if rollout is not None:
-        files |= _comparison(rollout, baseline, folder, film)
+        drawn = baseline is not None and len(baseline.line) >= 2 and rollout.measured is None
+        then = baseline_rollout(baseline, rollout) if baseline is not None and drawn else None
+        files["page"] = str(write_page([run], folder / "drive.html", baseline=then, faults=faults))
     write_text(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
     result = {**run.as_dict(), "files": files, "command": commands[0] if commands else "", "faults": list(faults)}
     write_json(folder / "result.json", result)
@@ -135,39 +112,14 @@ def remove_artefacts(folder: Path) -> None:
         folder.rmdir()
 
 
-def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film: bool) -> dict[str, str]:
-    """Write the figure and the film beside the baseline; without a baseline a film of the drive alone."""
-    driven = max(float(rollout.t[-1]), 0.0 if baseline is None else baseline.metric("duration_s"))
-    options: dict[str, Any] = {"size": FILM_SIZE, "fps": FILM_FPS, "speed": max(1.0, driven / FILM_LENGTH)}
-    if baseline is None or len(baseline.line) < 2:
-        if not film:
-            return {}
-        from antdrive.views.film.video import film as make_film
-
-        return {"film": str(make_film(rollout, folder / "film.mp4", **options).path)}
-    from antdrive.views.figures.run_figures import then_and_now
-
-    then, found = baseline_rollout(baseline, rollout), divergence(baseline, rollout)
-    place = None if found is None else (found.t, *found.then)
-    files = {"then and now": str(folder / "then-and-now.png")}
-    then_and_now(then, rollout, files["then and now"], divergence=place)
-    if film:
-        from antdrive.views.film.comparison_film import Mark, compare_film
-
-        mark = None if found is None else Mark(found.t, *found.then, f"divergence at {found.t:.1f} s")
-        info = compare_film(
-            [then, rollout], folder / "then-and-now.mp4", titles=("baseline", "now"), mark=mark, **options
-        )
-        files["film"] = str(info.path)
-    return files
-
-
 def baseline_rollout(baseline: Baseline, now: Rollout) -> Rollout:
-    """Return a drive along a baseline's line in the world of `now`, for figures, without commands and contacts."""
-    times = baseline.times
-    samples = np.array(baseline.line, dtype=np.float64)
-    pose = np.column_stack([samples[:, :2], np.unwrap(samples[:, 2])])
-    twist = speeds(times, pose)
+    """Return a drive along a baseline's line in the world of `now`, a row per physics step, without commands and contacts."""
+    samples, hz = np.array(baseline.line, dtype=np.float64), now.record.physics_hz
+    times = np.arange(round(baseline.times[-1] * hz) + 1) / hz
+    x, y, yaw = (np.interp(times, baseline.times, one) for one in (*samples[:, :2].T, np.unwrap(samples[:, 2])))
+    moved = hz * np.diff([x, y, yaw], prepend=[[x[0]], [y[0]], [yaw[0]]])
+    pose, twist = np.column_stack([x, y, yaw]), np.column_stack([np.hypot(moved[0], moved[1]), moved[2]])
+    rules = samples[np.searchsorted(baseline.times, times, side="right") - 1, 3]
     movers = now.trajectories().positions(times)
     length = baseline.metric("path_length_m")
     plan = dataclasses.replace(now.record.plan, length_m=length if math.isfinite(length) else 0.0)
@@ -178,12 +130,13 @@ def baseline_rollout(baseline: Baseline, now: Rollout) -> Rollout:
         pose=pose,
         twist=twist,
         command=twist,
-        limiter=np.minimum(samples[:, 3], len(record.limiters) - 1).astype(np.uint8),
+        limiter=np.minimum(rules, len(record.limiters) - 1).astype(np.uint8),
         movers=movers,
         contacts=np.empty((0, 4)),
         route=pose[:, :2],
         estimate=np.empty((0, 3)),
         actuated=np.empty((0, 2)),
+        **{name: getattr(now, name)[:0] for name in SENSED},
         record=record,
     )
     return dataclasses.replace(then, clearance=closed_form_clearance(then))

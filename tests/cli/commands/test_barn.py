@@ -1,14 +1,11 @@
 """`antdrive barn`, without its drives."""
 
-import importlib
 import json
-from pathlib import Path
 
 import numpy as np
 import pyarrow
 import pytest
 
-from antdrive.base.errors import InputError
 from antdrive.runs.campaigns import campaign, notation, sweeping  # noqa: F401
 from antdrive.runs.campaigns.results import SweepResults
 
@@ -17,8 +14,6 @@ ENDS = (
     {"key": "a", "succeeded": True, "outcome": "arrived", "reason": None, "rollout": None},
     {"key": "b", "succeeded": False, "outcome": "collided", "reason": "obstacles[3]", "rollout": "rollouts/b.npz"},
 )
-
-films = importlib.import_module("antdrive.views.film.video")
 
 
 @pytest.fixture
@@ -37,21 +32,11 @@ def driven(monkeypatch, tmp_path, compiled):
     return tmp_path
 
 
-def test_the_table_is_printed_whatever_becomes_of_the_films(driven, antdrive, monkeypatch):
-    def full(*_words, **_settings):
-        raise InputError("films: cannot be written (No space left on device)")
-
-    monkeypatch.setattr(films, "film_failures", full)
-    code, out, err = antdrive("barn", driven, "--film")
-    assert (code, err.splitlines()[-1]) == (2, "antdrive: films: cannot be written (No space left on device)")
-    assert ["world_0", "2", "1", "10.00"] in [line.split()[:4] for line in out.splitlines()]
-    assert "  DWA, 0.5 m/s: github.com/Daffan/the-barn-challenge, res/dwa_out.txt" in out.splitlines()
-
-
-def test_a_failure_is_listed_with_its_film_or_its_log(driven, antdrive, monkeypatch):
-    monkeypatch.setattr(films, "film_failures", lambda *_words, **_settings: {"b": Path("b.mp4")})
-    ends = [antdrive("barn", driven, *words)[1].splitlines()[-1] for words in ((), ("--film",))]
-    assert ends == [f"  world_0, seed 0: collided  obstacles[3]  {end}" for end in ("rollouts/b.npz", "b.mp4")]
+def test_the_table_is_printed_and_each_failure_with_its_log(driven, antdrive):
+    lines = antdrive("barn", driven)[1].splitlines()
+    assert ["world_0", "2", "1", "10.00"] in [line.split()[:4] for line in lines]
+    assert "  DWA, 0.5 m/s: github.com/Daffan/the-barn-challenge, res/dwa_out.txt" in lines
+    assert lines[-1] == "  world_0, seed 0: collided  obstacles[3]  rollouts/b.npz"
 
 
 def test_the_localisation_follows_the_map(driven, antdrive, monkeypatch):
@@ -89,7 +74,7 @@ def test_a_log_is_scored_by_both_formulas_and_its_gaps_are_named(log, antdrive):
 
 
 def test_a_log_that_cannot_be_scored_is_refused_in_one_line(log, refused):
-    assert "drives nothing" in refused("barn", "paths", "--score", log, "--film")
+    assert "drives nothing" in refused("barn", "paths", "--score", log, "--with-map")
     log.write_text("6 1 0 0 15.0\n6 1 0 0\n")
     assert "log.txt: line 2: must be WORLD SUCCESS" in refused("barn", "paths", "--score", log)
     (log.parent / "paths" / "path_6.npy").unlink()

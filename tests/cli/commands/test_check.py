@@ -40,7 +40,7 @@ def suite(tmp_path, monkeypatch):
 
 
 def test_a_suite_is_accepted_and_then_passes(antdrive, suite):
-    code, out, _ = antdrive("check", "a.drive.yaml::closed", "--jobs", "1", "--film", "never")
+    code, out, _ = antdrive("check", "a.drive.yaml::closed", "--jobs", "1")
     assert code == 1
     assert "is missing; accept this drive with antdrive accept 'a.drive.yaml::closed[0]'" in out
     code, out, _ = antdrive("accept", "a.drive.yaml", "--jobs", "1")
@@ -59,12 +59,12 @@ def test_a_suite_is_accepted_and_then_passes(antdrive, suite):
 
 def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive, suite):
     suite.write_text(SUITE + HIT)
-    code, out, _ = antdrive("accept", "a.drive.yaml", "--only", "hit", "--film", "never", "--results", "first")
+    code, out, _ = antdrive("accept", "a.drive.yaml", "--only", "hit", "--results", "first")
     assert code == 1
     assert "not accepted, because the drive misses the test's expectations" in out
     assert not (suite.parent / "baselines").exists()
     assert Path("first/a/hit-0/overview.png").is_file()
-    code, out, _ = antdrive("check", "a.drive.yaml::hit", "--json", "--film", "never", "--results", "res")
+    code, out, _ = antdrive("check", "a.drive.yaml::hit", "--json", "--results", "res")
     found = json.loads(out)
     (test,) = found["tests"]
     assert (code, found["passed"], test["outcome"], test["certified"]) == (1, False, "collided", False)
@@ -81,7 +81,7 @@ def test_the_command_in_a_message_repeats_the_drive(antdrive, suite):
     import shlex
 
     suite.write_text(SUITE + HIT)
-    _, out, _ = antdrive("check", "a.drive.yaml::hit", "--json", "--film", "never")
+    _, out, _ = antdrive("check", "a.drive.yaml::hit", "--json")
     (test,) = json.loads(out)["tests"]
     words = shlex.split(test["commands"][1])
     code, out, _ = antdrive(*words[1:], "--no-figures", "--json", "--out", "again")
@@ -94,7 +94,7 @@ def test_a_baseline_that_is_a_pipe_is_refused(antdrive, suite, command):
     folder = suite.parent / "baselines" / "a"
     folder.mkdir(parents=True)
     os.mkfifo(folder / "closed-0.json")
-    code, out, _ = antdrive(command, "a.drive.yaml::closed", "--jobs", "1", "--film", "never")
+    code, out, _ = antdrive(command, "a.drive.yaml::closed", "--jobs", "1")
     assert code == 2
     assert "closed-0.json: is a pipe; give a baseline" in out
 
@@ -172,7 +172,7 @@ def test_results_are_printed_as_they_come(antdrive, suite, monkeypatch):
         return made[0]
 
     monkeypatch.setattr(evaluation, "drive", interrupted)
-    code, out, _ = antdrive("check", "a.drive.yaml", "--jobs", "1", "--film", "never")
+    code, out, _ = antdrive("check", "a.drive.yaml", "--jobs", "1")
     assert (code, out.splitlines()[0]) == (130, "a.drive.yaml::clear[0]: FAILED")
 
 
@@ -183,7 +183,7 @@ def test_results_of_suites_of_one_name_are_kept_apart(antdrive, suite):
         entry = f'{{world: ../small.yaml, planner: astar, baseline: false, expect: {{duration_s: "{bound}"}}}}'
         (folder / "s.drive.yaml").write_text(f"schema: 1\nscenarios:\n  one: {entry}\n")
     suite.unlink()
-    code, out, _ = antdrive("check", ".", "--jobs", "1", "--film", "never", "--results", "res")
+    code, out, _ = antdrive("check", ".", "--jobs", "1", "--results", "res")
     assert (code, "1 of 2 passed" in out) == (1, True)
     assert (suite.parent / "res" / "x" / "s" / "one-0" / "rollout.npz").exists()
 
@@ -192,7 +192,7 @@ def test_results_that_cannot_be_written_do_not_hide_the_fault(antdrive, suite):
     (suite.parent / "res").mkdir()
     (suite.parent / "res" / "a").write_text("a file where a folder is due")
     suite.write_text(SUITE + HIT)
-    code, out, _ = antdrive("check", "a.drive.yaml::hit", "--film", "never", "--results", "res")
+    code, out, _ = antdrive("check", "a.drive.yaml::hit", "--results", "res")
     assert code == 1
     assert "  outcome: collided, expected succeeded" in out
     assert "  results: " in out
@@ -204,7 +204,7 @@ def test_ci_gets_junit_a_summary_and_unused_baselines(antdrive, suite, monkeypat
     gone = suite.parent / "baselines" / "a" / "gone-0.json"
     gone.parent.mkdir(parents=True)
     gone.write_text("{}")
-    words = ("check", "a.drive.yaml::hit", "--film", "never", "--junit", "out.xml", "--results", "res")
+    words = ("check", "a.drive.yaml::hit", "--junit", "out.xml", "--results", "res")
     code, out, _ = antdrive(*words)
     assert (code, "unused baseline: baselines/a/gone-0.json; remove it" in out) == (1, True)
     (case,) = ElementTree.parse("out.xml").iter("testcase")
@@ -242,7 +242,7 @@ def test_python_tests_are_accepted_and_checked_like_suites(antdrive, suite):
     """Beside a suite, a module without drives that cannot be imported, and the planner of another test."""
     (suite.parent / "test_accepted_here.py").write_text(PYTHON)
     (suite.parent / "test_of_others.py").write_text("import no_such_module\n")
-    words = (".", "--jobs", "1", "--film", "never", "--results", "res", "--json")
+    words = (".", "--jobs", "1", "--results", "res", "--json")
     code, out, err = antdrive("accept", *words)
     tests = {test["address"]: test for test in json.loads(out)["tests"]}
     assert (code, err) == (1, "")
@@ -259,7 +259,7 @@ def test_python_tests_are_accepted_and_checked_like_suites(antdrive, suite):
     assert (code, out.splitlines()[0]) == (1, "test_accepted_here.py::test_named: FAILED")
     assert "  changed since the baseline: world" in out
     (results := suite.parent.parent / "results elsewhere").mkdir()  # pytest takes no root from it
-    elsewhere = ("--film", "never", "--results", results)
+    elsewhere = ("--results", results)
     assert antdrive("accept", "test_accepted_here.py::test_named", *elsewhere)[1].splitlines() == [
         "test_accepted_here.py::test_named: renewed", "1 of 1 passed",
     ]  # fmt: skip
@@ -283,7 +283,7 @@ def test_processes_change_nothing(antdrive, suite):
 def test_a_process_for_each_core_that_may_be_used(cores, asked, started, monkeypatch, tmp_path):
     """joblib counts those of a container; the operating system says how many its host has."""
     found: list[int] = []
-    case = SimpleNamespace(written=Written(world="empty"))
+    case = SimpleNamespace(written=Written(world="empty"), entry=SimpleNamespace(log=None))
 
     def evaluate_cases(cases, *, jobs, **others):
         found.append(jobs)

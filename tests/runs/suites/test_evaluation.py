@@ -16,7 +16,7 @@ from antdrive.runs.suites.evaluation import Divergence, distances, divergence, e
 from antdrive.runs.suites.nearest import first_contact, nearest_of
 from antdrive.sim.log.metrics import Tolerance
 from antdrive.sim.log.record import hashes_of
-from antdrive.views.artefacts import MOST_FILMS, Results, baseline_rollout, portable_name, remove_artefacts
+from antdrive.views.artefacts import baseline_rollout, portable_name, remove_artefacts
 
 PLAIN = Demands()
 
@@ -337,15 +337,3 @@ def test_only_files_that_antdrive_writes_are_removed(tmp_path):
     (tmp_path / "thesis.txt").touch()
     remove_artefacts(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
-
-
-def test_of_failed_tests_the_first_ten_are_filmed(tmp_path):
-    """Each process has its own record of where results go; they share the folder in which films are counted."""
-    processes = [Results(tmp_path / "results", "failed", tmp_path) for _ in range(3)]
-    assert not processes[0].should_film(failed=False)
-    assert [processes[k % 3].should_film(failed=True) for k in range(13)] == [True] * MOST_FILMS + [False] * 3
-    assert MOST_FILMS == 10
-    for films in ("never", "always"):
-        results = Results(tmp_path / "results", films, tmp_path)
-        assert {results.should_film(failed=failed) for failed in (True, False)} == {films == "always"}
-    assert all(Results(tmp_path).should_film(failed=True) for _ in range(12)), "without a run of many there is no limit"

@@ -85,7 +85,8 @@ def test_a_suite_can_express_every_setting_of_a_scenario():
         "frame": "start",  # suites have places of the world itself
     }
     assert all(keys[field.name] in ScenarioEntry.model_fields for field in fields(Scenario))
-    about_files = {"settings", "out", "film", "prelude", "vector", "figures", "gui", "json"}
+    about_files = {"settings", "out", "film", "prelude", "camera", "size", "speed", "figures", "no_figures"}
+    about_files |= {"no_view", "json"}
     asked = set(inspect.signature(command).parameters) - about_files
     assert {keys[name] for name in asked} <= set(ScenarioEntry.model_fields)
 
@@ -159,7 +160,7 @@ def test_a_random_world_is_that_of_the_command_that_writes_it(tmp_path):
 def test_the_command_of_a_test_has_its_start_and_goal(tmp_path):
     case = only(tmp_path, "world: empty, planner: astar, start: [2, 1.5, -0.1], goal: [3, 4]")
     assert run_command(case) == (
-        "antdrive run empty --start=2.0,1.5,-0.1 --goal=3.0,4.0 --planner astar --robot turtlebot --seed 0"
+        "antdrive run empty --start=2,1.5,-0.1 --goal=3,4 --planner astar --robot turtlebot --seed 0"
     )
 
 
@@ -171,7 +172,7 @@ def test_a_test_drives_a_task_of_its_world(tmp_path):
     task = scenario_of(case).task
     assert (task.start, task.goal) == ((1, 2, 0), (2, 3))
     assert run_command(case).startswith("antdrive run")
-    assert " --task=dock --start=1.0,2.0,0.0 --planner" in run_command(case)
+    assert " --task=dock --start=1,2,0 --planner" in run_command(case)
     for words, message in (
         ("world: mine.yaml, task: docks", "mine.yaml: no task 'docks'; did you mean dock?"),
         ("world: empty, task: dock", "no task 'dock'; the world has no named tasks"),

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from antdrive.base.errors import InputError
 from antdrive.base.progress import bar
@@ -13,9 +13,6 @@ from antdrive.cli.console import print_error, show
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.output import print_faults
 from antdrive.sim.settings import SETTINGS
-
-if TYPE_CHECKING:
-    from antdrive.runs.campaigns.results import SweepResults
 
 
 @options.with_settings(
@@ -34,7 +31,6 @@ def barn(
     trials: Annotated[int, option("NUMBER", "Runs per world.", min=1, max=10_000)] = 10,
     jobs: options.Jobs = None,
     out: Annotated[Path, option("FOLDER", "Output folder; resumable.")] = Path("out/barn"),
-    films: Annotated[bool, flag("Film failed runs, with the cause, into OUT/films.", "--film")] = False,
     score: Annotated[
         Path | None, option("LOG", "Score a log of the challenge instead of driving; needs only the path_N.npy files.")
     ] = None,
@@ -49,8 +45,8 @@ def barn(
     whatever their outcomes; 3: as `sweep`.
     """
     if score:
-        if with_map or films:
-            raise InputError("--score: drives nothing; leave out --with-map and --film")
+        if with_map:
+            raise InputError("--score: drives nothing; leave out --with-map")
         return _score(source, score, json)
     require_physics()
     from antdrive.base.optional import parquet_library
@@ -75,12 +71,9 @@ def barn(
     with bar("driving") as progress:
         results = sweep(campaign, out / "runs", jobs=jobs, keep="failed", progress=progress, notify=print_error)
     found = challenge.BarnTable.of(results.table, fastest, kind, with_map=with_map)
-    if not json:
-        show(json, None, found.lines())  # before filming, which is slow and may fail
-    filmed = _films(results, out / "films") if films else {}
-    facts = {"folder": str(results.folder), **found.as_dict(), "films": [*map(str, filmed.values())]}
+    facts = {"folder": str(results.folder), **found.as_dict()}
     failed = (row for row in challenge.by_map(results.table)[kind].to_pylist() if not row["succeeded"])
-    show(json, facts, (_failure_line(row, filmed) for row in failed))
+    show(json, facts, [*found.lines(), *map(_failure_line, failed)])
     return print_faults(results.faults) or results.complete
 
 
@@ -97,14 +90,5 @@ def _score(source: Path, log: Path, json: bool) -> bool:
     return not result.gaps
 
 
-def _films(results: "SweepResults", folder: Path) -> dict[str, Path]:
-    """Film the failed runs. Return the films by run key."""
-    from antdrive.views.film.video import film_failures
-
-    with bar("filming failures") as progress:
-        return film_failures(results.table.to_pylist(), results.folder, folder, progress=progress)
-
-
-def _failure_line(row: Mapping[str, Any], films: Mapping[str, Path]) -> str:
-    where = f"  {row['world']}, seed {row['seed']}: {row['outcome']}  {row['reason'] or ''}"
-    return f"{where}  {films.get(row['key'], row['rollout'] or '')}"
+def _failure_line(row: Mapping[str, Any]) -> str:
+    return f"  {row['world']}, seed {row['seed']}: {row['outcome']}  {row['reason'] or ''}  {row['rollout'] or ''}"

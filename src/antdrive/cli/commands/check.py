@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast, get_args
+from typing import TYPE_CHECKING, Annotated
 
-from antdrive.base.errors import InputError
 from antdrive.base.progress import bar
 from antdrive.base.tables import marked
 from antdrive.cli import options
@@ -15,14 +14,13 @@ from antdrive.cli.scenario_options import with_calibrated_margin
 
 if TYPE_CHECKING:
     from antdrive.testing.evaluation import CheckResult, Update
-    from antdrive.views.artefacts import Films
 
 Suites = Annotated[
     list[str], argument("SUITE", "Suite (*.drive.yaml), test_*.py, folder, SUITE::scenario[seed] or FILE.py::test.")
 ]
 Only = Annotated[str | None, option("PATTERN", "Run only matching scenarios, such as 'aisle-*'.")]
-ResultsFolder = Annotated[Path | None, option("FOLDER", "Folder for logs, figures, films.  [default: user cache]")]
-Film = Annotated[str, option("WHEN", "Film tests: never, failed or always.")]
+ResultsFolder = Annotated[Path | None, option("FOLDER", "Folder for logs, pages, figures.  [default: user cache]")]
+Keep = Annotated[bool, flag("Write results of passed tests, too.", "--keep")]
 
 
 def check(
@@ -30,18 +28,18 @@ def check(
     only: Only = None,
     jobs: options.Jobs = None,
     results: ResultsFolder = None,
-    film: Film = "failed",
+    keep: Keep = False,
     junit: Annotated[Path | None, option("FILE", "Write the results as JUnit XML for CI services.")] = None,
     strict: Annotated[bool, flag("Fail on unused baselines.", "--strict")] = False,
     json: options.Json = False,
 ) -> int:
-    """Run suites or Python tests, and compare the drives with their baselines.
+    """Run suites or Python tests, and compare drives with baselines.
 
     Exit code 0: every drive meets its suite's expectations and is no worse than its baseline.
     """
     from antdrive.testing.session_summary import add_to_page, drives_in, properties, save_junit
 
-    outcomes, unused = _drive(tests, only, jobs, "", results, film, json=json)
+    outcomes, unused = _drive(tests, only, jobs, "", results, keep, json=json)
     if junit is not None:
         save_junit(outcomes, junit)
     add_to_page((drive for result in outcomes for drive in drives_in(properties(result))), unused, print_error)
@@ -54,14 +52,14 @@ def accept(
     new: Annotated[bool, flag("Write only missing baselines.", "--new")] = False,
     jobs: options.Jobs = None,
     results: ResultsFolder = None,
-    film: Film = "failed",
+    keep: Keep = False,
     json: options.Json = False,
 ) -> int:
     """Run suites or Python tests, and save the drives as baselines.
 
-    A drive that misses its test's expectations is rejected, with log, figures and film. Exit code 0: every drive was accepted.
+    A drive that misses its test's expectations is rejected, with log, page and figure. Exit code 0: every drive was accepted.
     """
-    outcomes, unused = _drive(tests, only, jobs, "new" if new else "all", results, film, json=json)
+    outcomes, unused = _drive(tests, only, jobs, "new" if new else "all", results, keep, json=json)
     return _summarise(outcomes, json, unused)
 
 
@@ -71,17 +69,15 @@ def _drive(
     jobs: int | None,
     update: "Update",
     folder: Path | None,
-    film: str,
+    keep: bool,
     *,
     json: bool,
 ) -> "tuple[list[CheckResult], list[str]]":
     """Drive and evaluate all named tests, and print each result; return the results and the unused baselines."""
     from antdrive.testing.checking import evaluate_tests
-    from antdrive.views.artefacts import Films, Results, cached_results
+    from antdrive.views.artefacts import Results, cached_results
     from antdrive.views.run_folder import check_folder
 
-    if film not in get_args(Films):
-        raise InputError(f"--film {film}: unknown; choose from {', '.join(get_args(Films))}")
     if folder is not None:
         check_folder(folder)
     noted: set[str] = set()
@@ -92,7 +88,7 @@ def _drive(
         for line in rest:
             print_line(f"  {line}")
 
-    results = Results(folder or cached_results(Path.cwd()), cast("Films", film))
+    results = Results(folder or cached_results(Path.cwd()), keep)
     with bar("driving") as progress:
         return evaluate_tests(
             words, only=only, jobs=jobs, update=update, results=results, choose=with_calibrated_margin,

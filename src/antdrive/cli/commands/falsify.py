@@ -7,8 +7,8 @@ from antdrive.base.files import file_name
 from antdrive.base.progress import bar
 from antdrive.cli import options
 from antdrive.cli.console import show
-from antdrive.cli.options import flag, option
-from antdrive.cli.output import film_drives, results_folder
+from antdrive.cli.options import option
+from antdrive.cli.output import results_folder
 from antdrive.cli.scenario_options import Setup
 from antdrive.runs.results_folder import mark_of
 
@@ -29,13 +29,13 @@ def falsify(
         float,
         option("SECONDS", "Time limit for shrinking each failure [s]; 0 disables it.", "--shrink", min=0.0, max=1e6),
     ] = 20.0,
-    film: Annotated[bool, flag("Film and draw each failure.", "--film/--no-film")] = True,
+    no_figures: options.NoFigures = False,
     json: options.Json = False,
     **given: Any,
 ) -> bool:
     """Search for worlds in which a configuration fails.
 
-    Every world has a path. Failures are repeated in another process, shrunk, and written as a suite with films.
+    Every world has a path. Failures are repeated in another process, shrunk, and written as a suite with pages of the drives.
     Ctrl-C ends the search and keeps the failures found so far. Exit code 0: no failure. Exit code 1: at least one failure.
     """
     from antdrive.runs.failures.hunt import find_failures, validate_method
@@ -56,7 +56,7 @@ def falsify(
             )
         with bar("shrinking") as shrinking:
             reported = write_reproducers(hunt, folder, seconds=seconds, progress=shrinking)
-        write_failures(reported, folder, film_drives if film else None)
+        write_failures(reported, folder, None if no_figures else ())
     facts = {
         "planner": scenario.planner_label,
         "robot": scenario.robot.name,
@@ -65,5 +65,5 @@ def falsify(
         "folder": str(folder) if reported else None,
         "reported": [one.as_dict() for one in reported],
     }
-    show(json, facts, failure_lines(hunt, reported, folder, filmed=film))
+    show(json, facts, failure_lines(hunt, reported, folder))
     return not hunt.findings

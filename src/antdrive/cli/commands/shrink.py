@@ -7,8 +7,8 @@ from antdrive.base.errors import InputError
 from antdrive.base.tables import file_lines
 from antdrive.cli import options
 from antdrive.cli.console import show, this_command, working
-from antdrive.cli.options import argument, flag, option
-from antdrive.cli.output import film_drives, results_folder
+from antdrive.cli.options import argument, option
+from antdrive.cli.output import results_folder
 from antdrive.cli.scenario_options import with_calibrated_margin
 from antdrive.runs.results_folder import mark_of
 from antdrive.views.run_folder import write_result, write_run
@@ -32,8 +32,7 @@ def shrink(
         float, option("SECONDS", "Search time [s]; repeating the command continues.", min=1.0, max=1e6)
     ] = 60.0,
     out: options.Out = None,
-    film: Annotated[bool, flag("Film the reproducer.", "--film/--no-film")] = True,
-    figures: options.Figures = True,
+    no_figures: options.NoFigures = False,
     jobs: Annotated[int, option("NUMBER", "Processes.", min=1, max=64)] = 1,
     json: options.Json = False,
 ) -> bool:
@@ -41,7 +40,7 @@ def shrink(
 
     Removes obstacles, movers, noise and digits, and moves start, goal and walls closer, while the failure stays the same:
     outcome, kind of contact and cause, or the broken bound or baseline of a test. Writes the world, a suite with the
-    scenario, the log and a film. Exit code 0: the result fails in the same way in another process.
+    scenario, the log and its page. Exit code 0: the result fails in the same way in another process.
     """
     from antdrive.runs.failures.failure import broken_bound, failing, parse_bound
     from antdrive.runs.failures.handover import scenario_name
@@ -63,9 +62,8 @@ def shrink(
         files = {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
         report: dict[str, Any] = {"files": files}
         if small.run is not None:  # else the planner or the controller raises an error
-            files = {**write_run(small.run, folder, this_command(), figures=figures)["files"], **files}
-            if film and small.rollout is not None:
-                files["film"] = film_drives([small.rollout], folder / f"{name}.mp4")["file"]
+            drawn = None if no_figures else ()
+            files = {**write_run(small.run, folder, this_command(), drawn, view=True)["files"], **files}
             report = write_result(small.run, files, this_command())
     report |= {**shrunk.as_dict(), "repeats": repeats}
     show(json, report, [*shrunk.lines(repeats), *file_lines(files)])

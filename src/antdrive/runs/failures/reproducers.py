@@ -95,21 +95,20 @@ def write_reproducers(
     return made
 
 
-def failure_lines(hunt: Hunt, reported: Sequence[Reproducer], folder: Path, *, filmed: bool) -> Iterator[str]:
+def failure_lines(hunt: Hunt, reported: Sequence[Reproducer], folder: Path) -> Iterator[str]:
     """Yield the result of a search as lines: its failures, and the commands that repeat and report them.
 
     Args:
         hunt: the search
         reported: its reproducers
         folder: of their suite
-        filmed: whether they are filmed
     """
     ended = "interrupted after" if hunt.interrupted else "after"
     runs = f"{amount(hunt.runs, 'run')} (the robot drove in {hunt.driven})"
     yield f"{ended} {runs}: {amount(len(hunt.findings), 'failure')}, {len(hunt.distinct)} distinct"
     if reported:
         yield from table(("name", "run", "repeats", "obstacles", "failure"), (one.cells for one in reported))
-        yield f"suite of the failures, {'with worlds, logs and films' if filmed else 'with worlds and logs'}: {folder}"
+        yield f"suite of the failures, with worlds, logs and pages: {folder}"
         yield f"repeat: {shlex.join(['antdrive', 'check', str(folder / SUITE)])}"
         yield f"report: {shlex.join(['antdrive', 'report', str(folder), '-o', str(folder / 'report.html')])}"
 
