@@ -16,10 +16,11 @@ from tests.runs.made_up_campaign import Skill
 
 @pytest.fixture
 def one_chart(monkeypatch):
-    """Of the charts of a report, which tests of views draw, the first distribution alone."""
-    for name, kept in (("PROFILED", 0), ("DISTRIBUTED", 1), ("BOXED", 0)):
-        monkeypatch.setattr(charts, name, getattr(charts, name)[:kept])
-    monkeypatch.setattr(charts, "_option_boxes", lambda *_: [])
+    """Of the charts of a report, which tests of views draw, the first profile alone."""
+    known = charts.known_metrics
+    monkeypatch.setattr(charts, "known_metrics", lambda paired, names: known(paired, names)[:1])
+    for name in ("_differences", "_size_boxes", "_option_charts"):
+        monkeypatch.setattr(charts, name, lambda *_: [])
 
 
 def test_compare_prints_both_tables(antdrive, camp):
@@ -129,7 +130,7 @@ def test_a_report_for_a_thesis_is_a_narrow_table_and_its_charts(antdrive, tmp_pa
         tmp_path / "figs",
     )
     assert (code, (tmp_path / "t.tex").read_text().count(r"\begin{tabular}{lr}")) == (0, 1)
-    assert {path.suffix for path in (tmp_path / "figs").iterdir()} == {".pdf", ".svg"}
+    assert {path.suffix for path in (tmp_path / "figs").iterdir()} == {".pdf", ".svg", ".tex"}
     assert "t.tex" in out
     assert "figs" in out
     for words, said in (

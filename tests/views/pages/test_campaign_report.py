@@ -1,6 +1,7 @@
 """A campaign's page in a browser: sorting, filtering, dialogs, phone layout and SVG charts."""
 
 import json
+import math
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -8,7 +9,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from antdrive.planners import History, PlanResult, PlanStatus
+from antdrive.runs.statistics.convergence import packed, unpacked
 from antdrive.runs.statistics.run_table import RunTable
+from antdrive.sim.log.rollout import Rollout
 from antdrive.views.colour_vision import luminance
 from antdrive.views.colours import label_styles
 from antdrive.views.pages.campaign_summary import summarise
@@ -17,6 +21,7 @@ from antdrive.views.pages.rendering import Quantity
 from antdrive.views.pages.report import Report, report_data
 from tests.runs.made_up_campaign import Skill, made_up_columns
 from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
+from tests.views.test_colours import contrast
 
 ODD = "</script><b>&\u2028odd"
 PLANNERS = {
@@ -44,8 +49,11 @@ window.addEventListener("load", () => {
   set("#filter", "ants=50"); found.option = rows().length; set("#filter", "");
   set("#outcome", "failed"); found.failed = $("#count").textContent; set("#outcome", "");
   set("#planner", "astar"); found.astar = $("#count").textContent; set("#planner", "");
-  head("seed").click(); const row = lines()[0]; row.click();
-  found.details = $("#details").textContent; found.of = Number(row.dataset.row); $("#details").close();
+  head("seed").click();
+  const press = (key) => document.activeElement.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+  lines()[0].focus(); press("ArrowDown"); press("Enter");
+  found.details = $("#details").textContent; found.of = rows()[1]; $("#details").close();
+  found.unscoped = all("th:not([scope])").length;
   found.matrix = all("#matrix tbody tr").map((line) => all("td", line).map((cell) => cell.textContent));
   const bad = all("#matrix button:not(.full)")[0]; bad.click();
   found.cell = $("#details h3").textContent;
@@ -58,7 +66,7 @@ window.addEventListener("load", () => {
   found.faded = all(".charts g[class^=planner-]").map((g) => [g.getAttribute("class"), g.style.opacity]);
   found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
   found.paper = getComputedStyle(document.body).backgroundColor;
-  found.curve = getComputedStyle($(".charts g.planner-0 path")).stroke;
+  found.curves = [0, 1, 2].map((k) => getComputedStyle($(`.charts g.planner-${k} path`)).stroke);
   found.faults = faults;
   const out = document.createElement("pre"); out.id = "found"; out.textContent = JSON.stringify(found); document.body.append(out);
 });
@@ -109,6 +117,7 @@ def test_in_a_browser_it_sorts_filters_and_opens(found, columns):
     assert found["astar"] == f"{columns['planner'].count('astar')} of {count} runs"
     assert columns["command"][found["of"]] in found["details"]
     assert columns["digest"][found["of"]] in found["details"]
+    assert found["unscoped"] == 0, "header cells name what they head"
 
 
 @needs_browser
@@ -130,10 +139,16 @@ def test_in_a_browser_cells_show_failures_and_pairs_are_chosen(found, columns):
 
 @needs_browser
 def test_the_page_follows_dark_mode(page, found):
-    light, dark = found, found_by(PROBE, page, "--force-dark-mode")
-    assert light["paper"] == "rgb(255, 255, 255)"
-    assert dark["paper"] == "rgb(20, 24, 31)"
-    assert light["curve"] != dark["curve"], "curves are lighter on a dark page"
+    papers = {"rgb(255, 255, 255)": found, "rgb(20, 24, 31)": found_by(PROBE, page, "--force-dark-mode")}
+    for paper, shown in papers.items():
+        assert shown["paper"] == paper
+        assert min(contrast(rgb(curve), rgb(paper)) for curve in shown["curves"]) > 3
+    light, dark = papers.values()
+    assert light["curves"] != dark["curves"], "colours too dark for a dark page are lighter there"
+
+
+def rgb(text):
+    return [int(part) for part in re.findall(r"\d+", text)]
 
 
 @needs_browser
@@ -150,7 +165,7 @@ def test_nothing_in_the_page_is_fetched_and_no_text_becomes_markup(page):
 
 
 def test_the_data_come_back_as_they_are(columns, summary, tmp_path):
-    text = report_data(Report("t", summary.table, tmp_path, summary), "x/")
+    text = report_data(Report("t", summary.table, tmp_path, summary), tmp_path)
     assert not set("<\u2028") & set(text)
     data = json.loads(text)
     found = {column["name"]: column for column in data["columns"]}
@@ -174,6 +189,22 @@ def test_the_data_come_back_as_they_are(columns, summary, tmp_path):
     assert data["shown"][:3] == ["world", "planner", "option.ants"]
 
 
+def test_failed_drives_that_have_logs_have_pages_and_other_files_none(columns, small_run, tmp_path):
+    """Names that lead out of the campaign's folder are no logs of it."""
+    camp, table = tmp_path / "camp", RunTable(columns)
+    names, failed = [None] * len(table), np.flatnonzero(~table.success)
+    for row, name in zip(failed.tolist(), ("logs/a.npz", "../b.npz", "logs/gone.npz", "logs/bad.npz"), strict=False):
+        names[row] = name
+    for name in ("logs/a.npz", "../b.npz"):
+        small_run.rollout.save(camp / name)
+    (camp / "logs" / "bad.npz").write_bytes(b"no log")
+    report = Report.of(summarise(RunTable({**table.columns, "rollout": names}), title="t"), camp)
+    views = json.loads(report_data(report, tmp_path))["views"]
+    assert views == {str(failed[0]): "camp/logs/a.html"}
+    assert Rollout.load(camp / "logs" / "a.html").digest == small_run.rollout.digest
+    assert [path.name for path in tmp_path.rglob("*.html")] == ["a.html"]
+
+
 @pytest.fixture(scope="module")
 def styles(summary):
     return label_styles(summary.paired.planners, ["ants", "ants", "astar"])
@@ -185,19 +216,20 @@ def charts(summary, styles):
 
 
 def test_charts_are_svg_with_a_curve_for_each_planner(charts, page):
-    assert [chart.title for chart in charts] == [
-        "Performance profile: driven length", "Performance profile: planning time", "Distribution: duration",
-        "Distribution: planning time", "By world size: planning time", "By world size: gap to grid optimum",
-        "ants by ants: planning time", "ants by ants: gap to grid optimum",
-    ]  # fmt: skip
+    measured = "driven length", "duration", "planning time"
+    compared = [f"{kind}: {name}" for name in measured for kind in ("Performance profile", "Paired differences")]
+    sized = [
+        f"{by}: {name}" for by in ("By world size", "ants by ants") for name in ("planning time", "gap to grid optimum")
+    ]
+    assert [chart.title for chart in charts] == [*compared, *sized]
     for chart in charts:
         tree = ElementTree.fromstring(chart.svg)
         assert "width" not in tree.attrib
-        if not chart.title.startswith(("By", "ants by")):
+        if chart.title.startswith("Performance"):
             curves = [node for node in tree.iter() if node.get("class", "").startswith("planner-")]
             assert len(curves) == 3
             assert all(f"var(--{node.get('class')})" in ElementTree.tostring(node, "unicode") for node in curves)
-        assert "var(--planner-" in chart.svg
+        assert "var(--planner-" in chart.svg or chart.title.startswith("Paired")
     shown = page.read_text()
     assert all(chart.svg in shown for chart in charts), "drawn again, the same bytes"
 
@@ -210,11 +242,11 @@ def test_worlds_are_grouped_by_area_or_where_that_is_one_by_their_shortest_paths
         columns["plan_s"] = [0.1] * 24
     for areas, says in (([4.0, 9.0, 400.0], "area of the world"), ([4.0] * 3, "shortest path on the grid")):
         columns["area_m2"] = [areas[int(world[-1]) % 3] for world in columns["world"]]
-        charts = campaign_charts(summarise(RunTable(columns), title="t", metrics=[]), label_styles("ab", "ab"))
+        charts = campaign_charts(summarise(RunTable(columns), title="t", metrics=["plan_s"]), label_styles("ab", "ab"))
         (chart,) = (chart for chart in charts if chart.title.startswith("By world size"))
         assert f"by {says}" in chart.note
         assert "12 instances" in chart.note
-        assert ("(4, 4, 4 from" in chart.note) == ("area" in says)
+        assert ("(4 each)" in chart.note) == ("area" in says)
         words = {text.get_text() for axes in chart.figure.axes for text in axes.texts}
         assert words == (set() if different else {"identical to a"})
 
@@ -236,6 +268,34 @@ def test_long_names_of_planners_stay_whole_and_apart(tmp_path):
     assert re.findall(r"([^{}]*){[^{}]*text-overflow", styles) == [" #runs td, #runs th "]
 
 
+def test_two_varied_options_have_heat_maps_and_histories_curves_by_three_kinds_of_effort():
+    labels = [(ants, rate) for ants in (10, 50) for rate in (0.1, 0.5)]
+    options = [{"ants": ants, "rate": rate} for ants, rate in labels]
+    planners = {
+        f"ants ants={o['ants']} rate={o['rate']}": Skill(1.0, 1.0 + o["rate"], name="ants", options=o) for o in options
+    }
+    columns = made_up_columns(planners, worlds=3, seeds=2)
+    best = np.array([[9.0, 8.0, 8.0], [math.inf, 9.5, 9.5]])
+    plans = [PlanResult(history=History(best=one), status=PlanStatus.SOLVED, work=600) for one in best]
+    assert [unpacked(packed(plan)).best.tolist() for plan in plans] == best.tolist()
+    assert packed(PlanResult(status=PlanStatus.NO_PATH)) is None
+    columns["history"] = [packed(plans[k % 2]) for k in range(len(columns["seed"]))]
+    columns["grid_optimum_m"] = [4.0] * len(columns["seed"])
+    summary = summarise(RunTable(columns), title="t", metrics=["duration_s"])
+    charts = {chart.title: chart.figure for chart in campaign_charts(summary, label_styles(list(planners)))}
+    axes = charts["ants by ants and rate: median duration"].axes[0]
+    assert [[label.get_text() for label in ticks] for ticks in (axes.get_yticklabels(), axes.get_xticklabels())] == [
+        ["10", "50"], ["0.1", "0.5"],
+    ]  # fmt: skip
+    assert (np.diff(axes.images[0].get_array(), axis=1) > 0).all(), "longer with a larger rate"
+    ends = []
+    for axis in ("iteration", "work", "planning time"):
+        (drawn, *_) = charts[f"Convergence by {axis}"].axes[0].lines
+        assert drawn.get_ydata()[-1] == pytest.approx((2.0 + 9.5 / 4) / 2)
+        ends.append(drawn.get_xdata()[-1])
+    assert ends[:2] == [3, pytest.approx(600e-6)]
+
+
 def test_charts_need_no_optional_columns():
     columns = made_up_columns({"a": Skill(0.0), "b": Skill(0.0)}, worlds=2, seeds=2)
     assert campaign_charts(summarise(RunTable(columns), title="t"), label_styles("ab", "ab")) == []
@@ -247,7 +307,7 @@ def test_times_that_are_all_zero_have_a_chart():
     columns = made_up_columns({"a": Skill(1.0), "b": Skill(1.0)})
     columns["plan_s"] = [0.0] * len(columns["plan_s"])
     charts = campaign_charts(summarise(RunTable(columns), title="t"), label_styles("ab", "ab"))
-    assert "Distribution: planning time" in [chart.title for chart in charts]
+    assert "Performance profile: planning time" in [chart.title for chart in charts]
 
 
 def test_styles_of_labels_differ_and_are_readable_on_their_ground():
@@ -263,15 +323,17 @@ def test_styles_of_labels_differ_and_are_readable_on_their_ground():
 
 
 def test_charts_for_a_thesis_have_truetype_fonts_names_and_one_width(summary, styles, charts, tmp_path):
-    files = write_charts(charts[:1], summary.paired.planners, tmp_path)
+    *files, captions = write_charts(charts[:1], summary.paired.planners, tmp_path, width=3.4)
     assert [path.suffix for path in files] == [".pdf", ".svg"]
     assert files[0].name == "performance-profile-driven-length.pdf"
+    assert r"\includegraphics{performance-profile-driven-length}" in captions.read_text()
+    assert "Higher is better" in captions.read_text()
     for path in files:
         content = path.read_bytes()
         if path.suffix == ".pdf":
             assert b"/Type3" not in content
             assert b"/TrueType" in content or b"/Type0" in content
-            assert b"/MediaBox [ 0 0 338.4 " in content
+            assert b"/MediaBox [ 0 0 244.8 " in content
         else:
             assert all(style.light.encode() in content for style in styles)
 

@@ -9,9 +9,7 @@ from antdrive.base.tables import file_lines
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import CampaignQuery, is_campaign, refuse_campaign_options
 from antdrive.cli.console import show
-from antdrive.cli.options import argument, flag, option
-
-PRINTED = (".pdf", ".svg")  # suffixes of charts
+from antdrive.cli.options import argument, option
 
 
 @options.with_settings()
@@ -21,7 +19,11 @@ def report(
         list[Path], argument("FOLDER", "Folders that contain runs of `antdrive run`, or campaign folders.")
     ],
     out: Annotated[Path | None, option("FILE", "Report: .html or .md; for campaigns also .tex or .csv.")] = None,
-    figures: Annotated[Path | None, option("DIR", "Folder for all charts as PDF and SVG, for a thesis.")] = None,
+    figures: Annotated[Path | None, option("DIR", "Folder for all charts as PDF and SVG, with captions.")] = None,
+    width: Annotated[
+        float | None,
+        option("INCHES", "Campaign: width of the charts, such as 3.4 for a column, 6.9 for a page.", min=2.0, max=20.0),
+    ] = None,
     columns: Annotated[
         str | None,
         option(
@@ -30,16 +32,17 @@ def report(
         ),
     ] = None,
     title: Annotated[str | None, option("TEXT", "Title.  [default: the folders' names]")] = None,
-    embed_films: Annotated[bool, flag("Embed films instead of linking to them.", "--embed-films")] = False,
     planner: Annotated[list[str] | None, option("LABEL", "Campaign: report on this planner only. Repeatable.")] = None,
     query: CampaignQuery,
     json: options.Json = False,
 ) -> None:
     """Write a report on many runs or on a campaign.
 
-    Runs: a sortable table, films, figures, and the commands that repeat the runs. Campaigns: paired comparisons of
+    Runs: a sortable table with links to their files and the commands that repeat them. Campaigns: paired comparisons of
     planners, charts, and all runs.
     """
+    if width and figures is None:
+        raise InputError("--width: needs --figures DIR")
     if out is None and figures is None:
         raise InputError("give -o FILE, --figures DIR, or both")
     named = [name.strip() for name in columns.split(",") if name.strip()] if columns else []
@@ -51,13 +54,19 @@ def report(
         other = next(folder for folder in folders if folder not in campaigns)
         if campaigns:
             raise InputError(f"{other}: is not a campaign folder, but {campaigns[0]} is; write separate reports")
-        given = [*(["planner"] if planner else []), *(["columns"] if named else []), *query.given]
+        given = [
+            *(["planner"] if planner else []),
+            *(["columns"] if named else []),
+            *(["width"] if width else []),
+            *query.given,
+        ]
         refuse_campaign_options(given, other)
     from antdrive.views.pages.report import write_report
 
-    written = write_report(folders, out, title=title, charts=figures, embed_films=embed_films, **asked)
+    written = write_report(folders, out, title=title, charts=figures, width=width, **asked)
     count, files, size = written.runs, written.files, sum(path.stat().st_size for path in written.files)
-    names = dict(zip(("report", "pairs"), (path for path in files if path.suffix not in PRINTED), strict=False))
+    tables = 2 if len(files) > 1 and files[1].suffix == ".csv" else 1
+    names = {} if out is None else dict(zip(("report", "pairs"), files[:tables], strict=False))
     show(
         json,
         {"file": str(files[0]), "files": [str(path) for path in files], "runs": count, "bytes": size},

@@ -16,6 +16,7 @@ from antdrive.base.optional import parquet_library
 from antdrive.base.version import versions
 from antdrive.runs.campaigns.job import Job
 from antdrive.runs.comparing import FAULTS as FAULTS
+from antdrive.runs.statistics.convergence import HISTORY, packed
 from antdrive.sim.facts import FACTS, IN_TABLE, facts_of
 from antdrive.sim.log.metrics import WALL_CLOCK
 from antdrive.sim.pipeline import Run
@@ -51,6 +52,7 @@ GRID: Mapping[str, str] = {
 RESULT: Mapping[str, str] = {
     "key": "string",
     **{name: FACTS[name].column for name in IN_TABLE if name not in WALL_CLOCK},
+    HISTORY: "string",
     "rollout": "string",
     **{f"version.{name}": "string" for name in VERSIONS},
     **{name: FACTS[name].column for name in WALL_CLOCK},
@@ -86,7 +88,7 @@ def grid_row(job: Job) -> dict[str, Any]:
 def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
     """Return the result columns of a run that ended by itself."""
     facts = {name: None if value != value else value for name, value in facts_of(run, IN_TABLE).items()}
-    return _empty(key) | facts | {"rollout": rollout}
+    return _empty(key) | facts | {HISTORY: packed(run.plan), "rollout": rollout}
 
 
 def failed_row(key: str, outcome: str, reason: str) -> dict[str, Any]:

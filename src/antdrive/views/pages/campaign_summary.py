@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -10,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.base.errors import FieldError
+from antdrive.base.errors import FieldError, amount
+from antdrive.base.tables import rounded_down
 from antdrive.runs.comparing import FAULTS
 from antdrive.runs.statistics.comparison import (
     ALPHA,
@@ -30,7 +32,7 @@ from antdrive.runs.statistics.significance import FLIPS
 from antdrive.runs.statistics.success import PlannerSuccess, common_medians, success_table
 from antdrive.sim.log.metrics import METRICS
 from antdrive.views.pages.quotes import disagreements, quotes
-from antdrive.views.pages.rendering import percent, percents
+from antdrive.views.pages.rendering import Quantity, percent, percents
 
 DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
 
@@ -56,6 +58,18 @@ class CampaignSummary:
     def table(self) -> RunTable:
         """Table of the runs."""
         return self.paired.table
+
+    @property
+    def verdict(self) -> str:
+        """The result in one sentence: the shown differences, or how many worlds show one; empty without a comparison."""
+        tested = {name: [row for row in rows if row.pairs] for name, rows in self.comparisons.items()}
+        worlds = amount(max((row.worlds for rows in tested.values() for row in rows), default=0), "world")
+        found = [_difference(name, rows) for name, rows in tested.items() if any(row.decided for row in rows)]
+        if found:
+            return f"{'; '.join(found)} ({worlds})."
+        need = max(_worlds_needed(self.comparisons).values(), default=0)
+        more = f"; it takes at least {need}" if need else ""
+        return f"No difference between planners is shown in {worlds}{more}." if any(tested.values()) else ""
 
     @property
     def sentences(self) -> list[str]:
@@ -161,15 +175,17 @@ def headline(table: RunTable, summary: CampaignSummary | None = None) -> list[tu
     runs, good, outcomes = len(table), table.success, table.texts("outcome")
     size = summary.size if summary is not None else runs
     bounds, driven = table.numbers("bound_m"), table.numbers("driven_length_m")
+    least = np.min(bounds[good], initial=math.inf, where=np.isfinite(bounds[good]))
     certified = np.array([value is not None for value in table.columns.get("certified", [None] * runs)])
+    tested = ", as their tests demand" if any(table.texts("test")) else ""
     died = sum(map(outcomes.count, ("crashed", *FAULTS)))
     counted = [(len(set(table.texts(name))), name) for name in ("planner", "world", "seed")]
     return [
-        (f"{int(good.sum()):,} / {runs:,}", "reached the goal, certified collision-free"),
+        (f"{int(good.sum()):,} / {runs:,}", f"reached the goal, certified collision-free{tested}"),
         *([(f"{runs:,}", f"of {size:,} runs done")] if runs < size else []),
         *((f"{count:,}", name if count == 1 else f"{name}s") for count, name in counted),
         *([_best(summary.success, summary.paired)] if summary is not None and summary.paired.shared.any() else []),
-        *([(f"{bounds[good].min():.3f} m", "smallest certified clearance")] if np.isfinite(bounds[good]).any() else []),
+        *([(f"{rounded_down(least, 3):.3f} m", "smallest certified clearance")] if math.isfinite(least) else []),
         *([(f"{np.nansum(driven[certified]):,.1f} m", "driven in total")] if certified.any() else []),
         *([(str(died), "crashes and planner errors")] if died else []),
     ]
@@ -239,24 +255,44 @@ def _repeated(rows: Sequence[PlannerSuccess]) -> list[str]:
     ]
 
 
+def _difference(measure: str, rows: Sequence[PairedComparison]) -> str:
+    """Return the differences that a measure shows, in words."""
+    decided = [row for row in rows if row.decided]
+    title = "success" if measure == SUCCESS else Quantity.of(measure).title
+    if len(rows) > 1:
+        best = [name for name, count in Counter(row.decided for row in decided).most_common(1) if count > 1]
+        led = f", {best[0]} leads most" if best and decided[0].direction != "neither" else ""
+        return f"{len(decided)} of {len(rows)} pairs differ in {title}{led}"
+    (row,) = decided
+    other = row.second if row.decided == row.first else row.first
+    if measure == SUCCESS:
+        return f"{row.decided} succeeds more often than {other}"
+    higher = (row.difference > 0) == (row.decided == row.first)
+    return f"{row.decided} has the {'higher' if higher else 'lower'} {title}, {other} the {'lower' if higher else 'higher'}"
+
+
+def _worlds_needed(comparisons: Mapping[str, Sequence[PairedComparison]]) -> dict[str, int]:
+    """Return the least number of worlds that can distinguish any pair, for each measure whose worlds cannot."""
+    return {
+        measure: math.floor(1 + math.log2(sum(row.pairs > 0 for row in rows) / ALPHA)) + 1
+        for measure, rows in comparisons.items()
+        if any(row.pairs for row in rows) and not any(_decidable(row, rows) for row in rows)
+    }
+
+
 def _too_few_worlds(comparisons: Mapping[str, Sequence[PairedComparison]]) -> list[str]:
     """Return a note for measures with too few worlds to distinguish any pair of planners, whatever the results."""
     least: dict[tuple[int, int], list[str]] = {}
-    for measure, rows in comparisons.items():
-        if any(row.pairs for row in rows) and not any(_decidable(row, rows) for row in rows):
-            place = max(row.worlds for row in rows), sum(row.pairs > 0 for row in rows)
-            least.setdefault(place, []).append(measure)
+    for measure, need in _worlds_needed(comparisons).items():
+        least.setdefault((max(row.worlds for row in comparisons[measure]), need), []).append(measure)
     notes = []
-    for (worlds, pairs), measures in least.items():
+    for (worlds, need), measures in least.items():
+        pairs = max(sum(row.pairs > 0 for row in comparisons[measure]) for measure in measures)
         of = "" if len(measures) == len(comparisons) else f" by {', '.join(measures)}"
-        compared = "a pair" if pairs == 1 else f"{pairs} pairs"
-        corrected = "" if pairs == 1 else " after Holm's correction"
-        need = math.floor(1 + math.log2(pairs / ALPHA)) + 1
         fewer = "" if pairs == 1 else ", or fewer pairs (--against, --planner)"
         notes.append(
-            f"{worlds} {'world is' if worlds == 1 else 'worlds are'} too few to distinguish {compared} of planners{of}: "
-            f"no p-value over worlds can be below {ALPHA:g}{corrected}. "
-            f"It takes {need} worlds{fewer}."
+            f"{worlds} {'world is' if worlds == 1 else 'worlds are'} too few to distinguish "
+            f"{'a pair' if pairs == 1 else f'{pairs} pairs'} of planners{of}: it takes {need} worlds{fewer}."
         )
     return notes
 

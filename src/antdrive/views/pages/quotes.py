@@ -87,7 +87,7 @@ def _disagreement(row: PairedComparison, tested: int) -> str:
     if max(p for p in (row.p, row.p_worlds) if not math.isnan(p)) < ALPHA:
         other = f"it holds for one pair, p for {tested} pairs together (Holm)"
     elif row.p < ALPHA:
-        other = f"a bootstrap over {row.worlds} worlds is too narrow, the test over worlds is not"
+        return f"{row.worlds} worlds are too few: the interval excludes 0, the test over worlds does not; undecided"
     return f"The interval excludes 0 although p is not below {ALPHA:g}, since {other}: no difference is shown"
 
 

@@ -20,6 +20,7 @@ from antdrive.sim.facts import FACTS, Fact
 
 if TYPE_CHECKING:
     import jinja2
+    import markupsafe
 
 NONE = "–"
 LONGEST = 200  # characters per text
@@ -33,6 +34,7 @@ class TextTable(NamedTuple):
     title: str
     headings: tuple[str, ...]  # of the columns
     rows: list[tuple[str, ...]]  # cells
+    note: str = ""  # of its caption: tests and directions
 
 
 def percent(fraction: float) -> str:
@@ -103,16 +105,6 @@ def _fact_of(name: str) -> Fact | None:
     return next((FACTS[known] for known in (name, f"{name}_m", f"{name}_s") if known in FACTS), None)
 
 
-def with_unit(name: str, value: Any) -> tuple[str, str]:
-    """Return the title of a fact and its value with the unit; another name and value as they are."""
-    quantity, known = Quantity.of(name), number(value)
-    if _fact_of(name) is None:
-        return name, shown(value)
-    if known is None:
-        return quantity.title, shown(value)
-    return quantity.title, f"{shown(round(quantity.factor * known, 6) + 0.0)} {quantity.unit}".rstrip()
-
-
 def short(value: float) -> str:
     """Format a number with three significant digits."""
     if not math.isfinite(value):
@@ -156,6 +148,7 @@ def shown(value: Any, longest: int = LONGEST) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
 
+ROUNDING = 1e-12  # smaller numbers are 0
 SIGNIFICANT = 6  # significant digits of numbers in a page
 
 
@@ -189,7 +182,7 @@ def _number(value: Any, factor: float) -> float | int | None:
         return None
     if isinstance(value, int) and factor == 1:
         return value
-    rounded = float(f"{factor * value:.{SIGNIFICANT}g}")
+    rounded = 0.0 if abs(value) < ROUNDING else float(f"{factor * value:.{SIGNIFICANT}g}")
     return int(rounded) if rounded.is_integer() and abs(rounded) < 1e15 else rounded
 
 
@@ -213,8 +206,16 @@ def _environment() -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
         autoescape=jinja2.select_autoescape(["html.j2"]),
     )
-    environment.filters |= {"md": lambda value: markdown_text(str(value)), "fence": fence_for}
+    environment.filters |= {"md": lambda value: markdown_text(str(value)), "fence": fence_for, "prose": _prose}
     return environment
+
+
+def _prose(text: str) -> markupsafe.Markup:
+    """Return a text as HTML, with `code` between backticks."""
+    from markupsafe import Markup
+
+    parts = enumerate(re.split("`([^`]+)`", text))
+    return Markup().join(Markup("<code>{}</code>").format(part) if k % 2 else part for k, part in parts)
 
 
 def link_to(path: Path, base: Path) -> str:

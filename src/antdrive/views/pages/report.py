@@ -1,12 +1,13 @@
 """Reports: an offline page, Markdown for pull requests, LaTeX for papers, and CSV.
 
-One page shows a run, several runs, the tests of a suite, or a campaign: headline numbers and a sortable table of runs. A
-campaign also has the comparison of its planners; runs that are no campaign's have a section each, with films and figures. The
-Markdown lists failures first and stays below 60 kB.
+One page shows a run, several runs, the tests of a suite, or a campaign: headline numbers and a sortable table of runs, which
+links the files of each. A campaign also has the comparison of its planners. The Markdown lists failures first and stays below
+60 kB.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import itertools
 import os
@@ -26,11 +27,11 @@ from antdrive.base.user_code import record_name
 from antdrive.runs.campaigns.results import common_folder, read_runs
 from antdrive.runs.campaigns.store import MANIFEST
 from antdrive.runs.statistics.run_table import HASHES, RunTable
+from antdrive.sim.facts import LoggedRun
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
-from antdrive.views.pages import attachments
 from antdrive.views.pages.campaign_summary import CampaignSummary, headline, summarise
 from antdrive.views.pages.rendering import (
     NONE,
@@ -43,7 +44,6 @@ from antdrive.views.pages.rendering import (
     rendered,
     script_json,
     shown,
-    with_unit,
 )
 from antdrive.views.pages.reported_runs import ReportedRun, find_runs, reported_run, run_table
 from antdrive.views.pages.tables import (
@@ -65,8 +65,9 @@ if TYPE_CHECKING:
 SUFFIXES, RUN_SUFFIXES = (".html", ".md", ".tex", ".csv"), (".html", ".md")
 MARKDOWN_BYTES = 60_000  # of a Markdown report; GitHub refuses comments of more than 65,536 characters
 MARKDOWN_ROWS = 60  # per table of a campaign
-MARKDOWN_FAILURES = 25  # listed failures of a campaign
-MOST_ROWS, MOST_DETAILS, ENOUGH_DETAILS, MOST_OUTCOMES = 256, 64, 8, 12  # of runs with sections
+MARKDOWN_FAILURES = 25  # listed failures
+MOST_VIEWS = 20  # pages of a campaign's failed drives
+MOST_ROWS, MOST_OUTCOMES = 256, 12  # of runs
 #: Columns of runs with their meaning, if it is not obvious; settings that differ come after the planner.
 MEASURED: Mapping[str, str] = MappingProxyType(
     {
@@ -97,7 +98,7 @@ class Report:
     table: RunTable  # the runs, a row each
     base: Path  # folder of the campaign, to which its logs are relative
     summary: CampaignSummary | None = None  # comparison of a campaign's planners
-    runs: Sequence[ReportedRun] = ()  # sections, one per row; empty for a campaign
+    runs: Sequence[ReportedRun] = ()  # one per row; empty for a campaign
 
     @classmethod
     def of(cls, summary: CampaignSummary, folder: Path) -> Report:
@@ -127,21 +128,13 @@ class Report:
     @functools.cached_property
     def shown(self) -> list[str]:
         """Columns that the table of runs shows."""
-        names = ("world", "planner", *self.differing, "outcome", "test", "seed", *MEASURED)
+        names = ("world", "planner", *self.differing, "outcome", "seed", *MEASURED)
         return [name for name in names if any(value is not None for value in self.table.columns.get(name, ()))]
 
     @functools.cached_property
     def quantities(self) -> dict[str, Quantity]:
         """How the columns are shown."""
         return {name: Quantity.of(name) for name in self.table.columns}
-
-    def heading(self, run: ReportedRun) -> str:
-        """Return the heading of a run's section: the run, and its settings that differ from another run's."""
-        settings = [name for name in self.differing if name != "robot" and not name.startswith("option.")]
-        known = [" ".join(with_unit(name, run.row[name])) for name in settings if run.row[name] is not None]
-        return " · ".join(
-            [*(str(run.row[name]) for name in ("world", "planner", "robot")), f"seed {run.row['seed']}", *known]
-        )
 
     def write(self, out: Path, columns: Sequence[str] = ()) -> list[Path]:
         """Write the report in the format of the file's suffix, a campaign's tables with these columns; return the files.
@@ -153,7 +146,9 @@ class Report:
         try:
             if self.summary is not None and kind in (".tex", ".csv"):
                 return (write_latex if kind == ".tex" else write_csv)(self.summary, out, columns)
-            return [write_text(out, _page(self, out.parent) if kind == ".html" else _markdown(self, columns))]
+            return [
+                write_text(out, _page(self, out.parent) if kind == ".html" else _markdown(self, out.parent, columns))
+            ]
         except FieldError as error:
             raise InputError(f"--{error}") from None
 
@@ -209,9 +204,7 @@ def write_report(
     title: str | None = None,
     columns: Sequence[str] = (),
     charts: str | os.PathLike[str] | None = None,
-    embed_films: bool = False,
-    figures: bool = True,
-    films: bool = False,
+    width: float | None = None,
     **compared: Any,
 ) -> ReportFiles:
     """Write a report of runs from Python and of all runs below folders, or of campaigns.
@@ -225,10 +218,8 @@ def write_report(
             charts alone
         title: the report's title; default: the folders' names
         columns: headings of a campaign's tables to write, in order; tables without all of them are left out; not for .html
-        charts: folder for all charts as PDF and SVG; None: none
-        embed_films: embed films of folders instead of linking them
-        figures: embed each run's figures in the page
-        films: film each run from Python and embed the film
+        charts: folder for all charts as PDF and SVG, with their captions in `figures.tex`; None: none
+        width: of a campaign's charts [inches], such as 3.4 for a column; None: 4.7
         compared: metrics, against, planners, allow and where, as in `summarise_campaign`
 
     Raises:
@@ -246,89 +237,94 @@ def write_report(
         raise InputError("--columns: applies to .md, .tex and .csv")
     if not campaigns:
         if target is not None:
-            report = _of_runs(given, target, title, embed_films=embed_films, figures=figures, films=films)
+            report = _of_runs(given, target, title)
         drawn = [] if charts is None else write_run_figures(folders, Path(charts))
         return ReportFiles(len(report.table), report.write(target) + drawn) if target else ReportFiles(0, drawn)
     summary = summarise_campaign(folders, title=title, **compared)
     report = Report.of(summary, common_folder(folders))
     files = [] if target is None else report.write(target, columns)
     if charts is not None:
-        from antdrive.views.pages.charts import campaign_charts, write_charts
+        from antdrive.views.pages.charts import WIDTH, campaign_charts, write_charts
 
-        files += write_charts(campaign_charts(summary, report.styles), report.planners, Path(charts))
+        pictures = campaign_charts(summary, report.styles)
+        files += write_charts(pictures, report.planners, Path(charts), width or WIDTH)
     return ReportFiles(len(report.table), files)
 
 
-def _of_runs(
-    given: Sequence[Any], target: Path, title: str | None, *, embed_films: bool, figures: bool, films: bool
-) -> Report:
-    """Return the report of runs and of folders with runs, with their films and, for a page, their figures."""
-    page, reported = target.suffix == ".html", list[ReportedRun]()
+def _of_runs(given: Sequence[Any], target: Path, title: str | None) -> Report:
+    """Return the report of runs and of folders with runs."""
+    reported = list[ReportedRun]()
     for source in given:
         found = [reported_run(source)] if isinstance(source, Run) else list(find_runs(Path(source)))
         if not found:
             raise InputError(f"{source}: no runs (no result.json); write them with `antdrive run --out`")
-        if isinstance(source, Run) and page:
-            found[0].figures.extend(attachments.drawn_figures(source) if figures else ())
-            found[0].films.extend(attachments.filmed(source) if films else ())
         reported += found
     if not reported:
         raise InputError(f"{target}: no runs to report")
-    attachments.attach_files(reported, target.parent, page=page, figures=figures, embed_films=embed_films)
     name = title or (Path(given[0]).resolve().name if len(given) == 1 and not isinstance(given[0], Run) else "runs")
     return Report(shown(name), run_table(reported), target.parent, runs=reported)
 
 
 def write_run_figures(folders: Iterable[Path], out: Path) -> list[Path]:
     """Write the overview of every drive below folders, and a comparison of each world's, as PDF and SVG."""
+    from antdrive.views.colours import label_styles
     from antdrive.views.figures.canvas import PRINTED
     from antdrive.views.figures.run_figures import comparison_figure, overview
 
-    files: list[Path] = []
+    files, planners = list[Path](), dict[str, str]()
     cases: dict[tuple[str, int], dict[str, Rollout]] = {}
     for log in [path for folder in folders for path in sorted(folder.rglob("rollout.npz"))]:
         rollout = Rollout.load(log)
         name, task = log.parent.name, rollout.record.task
         stem = file_name("-".join(log.parent.parts[-2:]))
-        files += [out / f"{stem}-overview{suffix}" for suffix in PRINTED]
-        for path in files[-2:]:
+        for path in [out / f"{stem}-overview{suffix}" for suffix in PRINTED]:
             overview(rollout, path)
+            files.append(path)
         cases.setdefault((task.world.name, rollout.record.seed), {})[name] = rollout
+        planners[name] = rollout.record.planner.name
+    styles = dict(zip(planners, label_styles(list(planners), list(planners.values())), strict=True))
     for (world, seed), drives in cases.items():
-        files += [out / file_name(f"{world}-{seed}-comparison{suffix}") for suffix in PRINTED if len(drives) > 1]
-        for path in files[-2:] if len(drives) > 1 else ():
-            comparison_figure(drives, path)
+        for path in [out / file_name(f"{world}-{seed}-comparison{end}") for end in PRINTED if len(drives) > 1]:
+            comparison_figure(drives, path, styles=styles)
+            files.append(path)
     if not files:
         raise InputError(f"{', '.join(map(str, folders))}: no logs (no rollout.npz) to draw")
     return files
 
 
-def _markdown(report: Report, columns: Sequence[str]) -> str:
-    """Return the Markdown; sections and rows of runs beyond the size limit are only counted."""
-    success = report.table.success
+def _markdown(report: Report, folder: Path, columns: Sequence[str]) -> str:
+    """Return the Markdown for a folder; rows and failures of runs beyond the size limit are only counted."""
+    success, outcomes = report.table.success, report.table.texts("outcome")
     ordered = sorted(range(len(success)), key=lambda k: bool(success[k]))
-    rows, details = (min(len(report.runs), most) for most in (MOST_ROWS, MOST_DETAILS))
-    failures, outcomes = [] if report.runs else [k for k in ordered if not success[k]], report.table.texts("outcome")
-    listed = report.table.take(failures[:MARKDOWN_FAILURES])
-    facts = {name: listed.texts(name) for name in ("world", "planner", "seed", "outcome", "reason")}
-    facts["command"] = [command or "" for command in _own_commands(listed)]
-    told = [dict(zip(facts, values, strict=True)) for values in zip(*facts.values(), strict=True)]
-    content = {**_common(report), "failures": told, "failed": len(failures)}
+    failures = [k for k in ordered if not success[k]]
     tables = chosen_tables(all_cells(report.summary), columns) if report.summary else []
+    rows, most = min(len(report.runs), MOST_ROWS), MARKDOWN_FAILURES
     while True:
         text = rendered(
             "page.md.j2",
-            **content,
+            **_common(report),
             tables=[*tables, *([_text_table(report, ordered[:rows])] if rows else [])],
             words=(*WORDS, *(report.quantities[name].heading for name in report.shown if report.table.worded(name))),
             most=max(rows, MARKDOWN_ROWS),
             uncounted=outcome_counts([outcomes[k] for k in ordered[rows:]]) if report.runs else "",
-            detailed=[report.runs[k] for k in ordered[:details]],
-            undetailed=len(report.runs) - details,
+            failed=len(failures),
+            failures=_failures(report, folder, failures[:most]),
         )
         if len(text.encode()) <= MARKDOWN_BYTES or not rows:
             return re.sub(r"\n{3,}", "\n\n", text.strip()) + "\n"
-        rows, details = (rows, details // 2) if details > ENOUGH_DETAILS else (rows // 2, details // 2)
+        rows, most = rows // 2, most // 2
+
+
+def _failures(report: Report, folder: Path, rows: list[int]) -> list[dict[str, Any]]:
+    """Return the facts of failed runs."""
+    listed, runs = report.table.take(rows), [report.runs[k] for k in rows] if report.runs else []
+    facts: dict[str, Sequence[Any]] = {
+        **{name: listed.texts(name) for name in ("world", "planner", "seed", "outcome", "reason")},
+        "command": [run.row["command"] for run in runs] or _own_commands(listed),
+        "why": [[run.certificate, *run.why] for run in runs] or [()] * len(rows),
+        "link": [run.link(folder) for run in runs] or [""] * len(rows),
+    }
+    return [dict(zip(facts, values, strict=True)) for values in zip(*facts.values(), strict=True)]
 
 
 def _text_table(report: Report, rows: Sequence[int]) -> TextTable:
@@ -384,17 +380,16 @@ def _page(report: Report, folder: Path) -> str:
         measure_title=measure_title,
         words=WORDS,
         rows=len(report.table),
-        runs=report.runs,
-        data=report_data(report, link_to(report.base, folder) + "/"),
+        data=report_data(report, folder),
     )
 
 
-def report_data(report: Report, base: str) -> str:
-    """Return the runs as JSON for a script element."""
+def report_data(report: Report, folder: Path) -> str:
+    """Return the runs as JSON for a script element of a page in a folder."""
     table = report.table
     columns = [json_column(name, table.columns[name]) for name in table.columns if name != "command"]
-    commands = {"name": "command", **_commands(table)} if report.summary else None
-    kept = [column for column in (*columns, commands) if column is not None]
+    commands = _commands(table) if report.summary else json_texts([run.row["command"] for run in report.runs])
+    kept = [column for column in (*columns, {"name": "command", **commands}) if column is not None]
     return script_json(
         {
             "rows": len(table),
@@ -404,10 +399,34 @@ def report_data(report: Report, base: str) -> str:
             "titles": {name: quantity.heading for name, quantity in report.quantities.items()},
             "good": [int(value) for value in table.success],
             "sentences": SENTENCES,
-            "base": base,
-            "sections": bool(report.runs),
+            "base": link_to(report.base, folder) + "/",
+            "views": _failed_views(report, folder)
+            if report.summary
+            else {k: link for k, run in enumerate(report.runs) if (link := run.link(folder))},
+            "details": [{"told": f"{run.sentence} {run.certificate}".strip(), "why": run.why} for run in report.runs],
         }
     )
+
+
+def _failed_views(report: Report, folder: Path) -> dict[int, str]:
+    """Write the pages of a campaign's first failed drives beside their logs, and return links to them by row."""
+    from antdrive.views.viewer.drive_page import write_page
+
+    found: dict[int, str] = {}
+    for row, (name, good) in enumerate(zip(report.table.texts("rollout"), report.table.success, strict=True)):
+        log = report.base / name
+        if (
+            good
+            or len(found) == MOST_VIEWS
+            or not (log.is_file() and log.resolve().is_relative_to(report.base.resolve()))
+        ):
+            continue
+        view = log.with_suffix(".html")
+        with contextlib.suppress(InputError):  # a damaged log, or a folder that cannot be written
+            if not view.exists() or view.stat().st_mtime < log.stat().st_mtime:
+                write_page([LoggedRun.of(Rollout.load(log))], view)
+            found[row] = link_to(view, folder)
+    return found
 
 
 def _commands(table: RunTable) -> dict[str, Any]:
@@ -451,11 +470,11 @@ def _common(report: Report) -> dict[str, Any]:
     return {
         "title": report.title,
         "summary": summary,
+        "verdict": summary.verdict if summary else "",
         "cards": headline(report.table, summary),
         "notes": [*summary.sentences, *summary.notes] if summary else [],
         "definitions": {name: METRICS[name].definition for name in compared if name in METRICS},
         "column_notes": [
             (report.quantities[name].title, note) for name, note in MEASURED.items() if note and name in report.shown
         ],
-        "heading": report.heading,
     }

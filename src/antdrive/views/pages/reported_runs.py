@@ -1,33 +1,31 @@
-"""Runs of a report that are no campaign's: rows of its table, and sections of its page.
+"""Runs of a report that are no campaign's: rows of its table and their details.
 
 A run is what its log says; without a log, what result.json claims.
 """
 
 from __future__ import annotations
 
-import math
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from antdrive.base.errors import InputError, input_error
 from antdrive.runs.statistics.run_table import RunTable
 from antdrive.sim.facts import FACTS, SENSED, LoggedRun, facts_of
-from antdrive.sim.log.margin import has_default
+from antdrive.sim.log.certificate import at_least
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
 from antdrive.sim.recorded import command_of
 from antdrive.sim.verifying import false_claims, read_result
-from antdrive.views.pages.rendering import number, shown, with_unit
+from antdrive.views.pages.rendering import link_to, number, shown
 
 LONGEST_COMMAND = 4000  # characters
-LISTED_SIGHTS = 40  # number of listed cylinders, those with the closest approaches
+VIEW = "drive.html"  # page of a run
 UNDRIVEN = (Outcome.NO_PATH.key, Outcome.STOPPED.key)  # outcomes of runs without a log
-RED = (Outcome.COLLIDED.key, Outcome.INVALID_PLAN.key)  # outcomes with a red badge
 REQUIRED = ("world", "planner", "robot", "seed", "outcome")  # keys of result.json
 WRITTEN = tuple(name for name, fact in FACTS.items() if fact.proof == "written")
 #: Columns of settings, as in a campaign's table, by their keys in result.json.
@@ -37,20 +35,8 @@ COLUMNS = {"margin_m": "margin", "cell_m": "cell"} | {
 
 
 @dataclass(frozen=True)
-class Attachment:
-    """Film, figure or file of a run."""
-
-    name: str  # file name
-    source: str  # path relative to the page, or data URI
-    is_video: bool = False  # whether it needs a video element; other films are animated images
-    caption: str = ""  # of a figure
-    width: int = 0  # of an embedded figure [px]
-    height: int = 0  # of an embedded figure [px]
-
-
-@dataclass(frozen=True)
 class ReportedRun:
-    """Row of a run and the texts of its section."""
+    """Row of a run and the texts of its details."""
 
     folder: Path | None  # folder of the run's files; None for a run from Python
     row: dict[str, Any]  # values by column
@@ -59,15 +45,19 @@ class ReportedRun:
     certificate: str  # the certificate
     problems: list[str]  # of the certificate, and contradictions between result.json and the log, a sentence each
     faults: list[str]  # failures of the run's test, as claimed by result.json, a sentence each
-    details: list[tuple[str, list[tuple[str, str]]]]  # names and values under headings
-    figures: list[Attachment] = field(default_factory=list)  # figures, embedded; of the Markdown report beside it
-    films: list[Attachment] = field(default_factory=list)  # films, embedded or linked
-    links: list[Attachment] = field(default_factory=list)  # files beside the page
 
     @property
-    def badge(self) -> str:
-        """The CSS class of the outcome's badge."""
-        return "good" if self.row["succeeded"] else "hit" if self.row["outcome"] in RED else ""
+    def why(self) -> list[str]:
+        """Why the run is no success, a sentence each."""
+        return [*self.problems, *(f"test failed: {fault}" for fault in self.faults)]
+
+    def link(self, base: Path) -> str:
+        """Return the path of the run's page, or of its folder, relative to the report's; empty for a run from Python."""
+        if self.folder is None:
+            return ""
+        view = self.folder / VIEW
+        inside = view.is_file() and view.resolve().is_relative_to(self.folder.resolve())
+        return link_to(view if inside else self.folder, base)
 
 
 def find_runs(folder: Path) -> Iterator[ReportedRun]:
@@ -96,49 +86,28 @@ def logged_run(rollout: Rollout, result: Mapping[str, Any], name: str, folder: P
     """Return a run as its log says, and the contradictions of the result beside it."""
     try:
         log = LoggedRun.of(rollout)
-        facts, sights = {**facts_of(log, WRITTEN), "metrics": log.metrics}, tuple(passed(rollout))
+        facts = {**facts_of(log, WRITTEN), "metrics": log.metrics}
     except ValueError as error:
         raise input_error(name, str(error)) from None
     certificate, record = log.certificate, rollout.record
-    outcome, plain = record.outcome, record.as_dict()
-    settings = {"route": plain["smoothing"]["made"]}
-    settings |= {
-        "noise": plain["noise"],
-        "margin": plain["margin"],
-        "inflate": f"{plain['inflate']:g} m",
-        "cell": plain["cell"],
-    }
-    settings |= {key: plain[key] for key in ("physics_hz", "control_hz", "time_limit")}
-    if has_default(record):
-        settings["margin"] = f"{settings['margin']:g} m, the default for this noise and route"
-    if len(rollout.scans) and record.robot.lidar is not None:
-        settings["scans"] = f"{len(rollout.scans)} of {record.robot.lidar.beams} beams"
-    proved = f"at least {certificate.bound:.4f} m of clearance, including between logged poses."
+    outcome = record.outcome
+    proved = f"at least {at_least(certificate.bound)} of clearance, including between logged poses."
     faults = _faults(result)
     row = _row({**facts, "outcome": outcome.key, "reason": record.reason}, faults) | {
-        "succeeded": log.succeeded,
+        "succeeded": log.succeeded and not faults,
         "certified": certificate.certified,
         "bound_m": number(certificate.bound),
         "digest": rollout.digest,
-        "command": shown(command_of(rollout.record) or "", LONGEST_COMMAND) or None,
+        "command": _test_command(result) or shown(command_of(rollout.record) or "", LONGEST_COMMAND) or None,
     }
     return ReportedRun(
         folder,
         row,
         _options(facts),
-        _capital(outcome.value),
+        _capital(outcome.value) + (f" ({shown(record.reason)})." if record.reason else "."),
         f"{_capital(certificate.statement)}: {proved}" if certificate.certified else "Not certified collision-free.",
         [*certificate.problems, *map(shown, false_claims(result, log))],
         faults,
-        [
-            ("Metrics", _pairs(log.metrics)),
-            ("First detections and closest approaches", _sight_pairs(sights)),
-            ("Certificate", _pairs({key: one for key, one in certificate.as_dict().items() if key != "problems"})),
-            ("Planner", _pairs(plain["planner"]["settings"])),
-            ("Controller", _pairs(plain["controller"]["settings"])),
-            ("Run", _pairs({**settings, "digest": rollout.digest})),
-            ("Versions", _pairs(plain["versions"])),
-        ],
     )
 
 
@@ -150,20 +119,14 @@ def claimed_run(result: Mapping[str, Any], folder: Path | None = None) -> Report
     facts = {**result, "metrics": metrics if claimed else {name: metrics[name] for name in metrics if name == "plan_s"}}
     row = _row(facts, faults) | {"succeeded": False, "certified": None, "bound_m": None, "command": None}
     row["outcome"] += ", claimed" if claimed else ""
-    run = {key: result[key] for key in (*COLUMNS, "margin_auto", "time_limit_s", "settings") if key in result}
     return ReportedRun(
         folder,
         row,
         _options(result),
-        _capital(shown(result.get("sentence") or "")),
+        _capital(shown(result.get("sentence") or "")) + "." * bool(result.get("sentence")),
         "Claimed by result.json, without a log." if claimed else "The robot did not drive.",
         [],
         faults,
-        [
-            ("Claimed metrics", _pairs(facts["metrics"])),
-            ("Claimed planner", _pairs(result.get("options"))),
-            ("Claimed run", _pairs({**run, "digest": result.get("digest")})),
-        ],
     )
 
 
@@ -193,8 +156,8 @@ def _row(facts: Mapping[str, Any], faults: Sequence[str]) -> dict[str, Any]:
         "planner_name": name,
         "robot": shown(facts.get("robot")),
         "seed": _plain(facts.get("seed")),
-        "outcome": shown(facts["outcome"]),
-        "test": "test failed" if faults else None,
+        "outcome": shown(facts["outcome"]) + (", test failed" if faults else ""),
+        "test": "failed" if faults else None,
         "reason": shown(facts.get("reason") or "") or None,
         **{column: _plain(facts.get(key)) for key, column in COLUMNS.items()},
         **{key: _plain(sensed.get(key, usual)) for key, usual in SENSED.items()},
@@ -218,23 +181,15 @@ def _faults(result: Mapping[str, Any]) -> list[str]:
     return [shown(text, LONGEST_COMMAND) for text in claimed] if isinstance(claimed, list) else []
 
 
+def _test_command(result: Mapping[str, Any]) -> str | None:
+    """Return a test's command if result.json names one and nothing else: records of tests in Python name no files."""
+    try:
+        words = shlex.split(claimed := str(result.get("command")))
+    except ValueError:
+        return None
+    runs_a_test = words[:-1] in (["antdrive", "check"], ["pytest"]) and not words[-1].startswith("-")
+    return claimed if runs_a_test and shlex.join(words) == claimed and claimed.isprintable() else None
+
+
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
-
-
-def _sight_pairs(sights: Sequence[Sighting]) -> list[tuple[str, str]]:
-    """Return first detection and closest approach of the nearest objects, sorted by time."""
-    nearest = sorted(sights, key=lambda sight: (not sight.touched, sight.nearest))[:LISTED_SIGHTS]
-    pairs = []
-    for sight in sorted(nearest, key=lambda sight: sight.nearest_at):
-        seen = (
-            f"detected {sight.seen_at:.2f} s, {sight.seen_from:.2f} m" if math.isfinite(sight.seen_at) else "undetected"
-        )
-        tracked = f"tracked {sight.tracked_at:.2f} s; " if math.isfinite(sight.tracked_at) else ""
-        came = f"{'contact' if sight.touched else 'closest'} {sight.nearest_at:.2f} s, {sight.nearest:.2f} m"
-        pairs.append((sight.name, f"{seen}; {tracked}{came}"))
-    return pairs
-
-
-def _pairs(values: Any) -> list[tuple[str, str]]:
-    return [with_unit(shown(key), value) for key, value in values.items()] if isinstance(values, Mapping) else []

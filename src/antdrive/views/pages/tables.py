@@ -14,6 +14,7 @@ from antdrive.base.atomic import atomic_write, write_text
 from antdrive.base.errors import FieldError, amount
 from antdrive.runs.statistics.comparison import SUCCESS, PairedComparison
 from antdrive.runs.statistics.success import PlannerSuccess
+from antdrive.sim.log.metrics import METRICS
 from antdrive.views.pages.campaign_summary import CampaignSummary
 from antdrive.views.pages.rendering import NONE, Quantity, TextTable, percent, percents, probability
 
@@ -51,7 +52,8 @@ def success_cells(summary: CampaignSummary) -> TextTable:
             )
         )
     smoothings = list(dict.fromkeys(summary.table.texts("smoothing")))
-    return TextTable(f"Success by planner (smoothing {', '.join(smoothings)})", headings, rows)
+    note = f"Wilson's intervals; medians over the {summary.common} instances that every planner solved."
+    return TextTable(f"Success by planner (smoothing {', '.join(smoothings)})", headings, rows, note)
 
 
 def pair_cells(measure: str, comparisons: Sequence[PairedComparison]) -> TextTable:
@@ -70,7 +72,19 @@ def pair_cells(measure: str, comparisons: Sequence[PairedComparison]) -> TextTab
     )
     quantity = Quantity.of(measure)
     title, shown = ("Success of pairs", percent) if success else (quantity.heading, quantity.text)
-    return TextTable(title, headings, [_pair_row(row, shown, over, unpaired) for row in comparisons])
+    return TextTable(
+        title, headings, [_pair_row(row, shown, over, unpaired) for row in comparisons], _tests(measure, over)
+    )
+
+
+def _tests(measure: str, over: bool) -> str:
+    """Return the tests and the direction of a table of pairs in words."""
+    better = "higher" if measure == SUCCESS else METRICS[measure].better
+    test = "Exact McNemar test" if measure == SUCCESS else "Wilcoxon's signed rank test where both succeeded"
+    worlds = "; p worlds: sign flips of whole worlds" if over else ""
+    direction = "no direction is better" if better == "neither" else f"{better} is better"
+    size = "of shares" if measure == SUCCESS else "median of pairs"
+    return f"{direction[0].upper()}{direction[1:]}. Difference: first minus second, {size}. {test}{worlds}; Holm's correction."
 
 
 def _pair_row(row: PairedComparison, shown: Callable[[float], str], over: bool, unpaired: bool) -> tuple[str, ...]:
@@ -124,7 +138,7 @@ def chosen_tables(tables: Sequence[TextTable], columns: Sequence[str]) -> list[T
         picked = [places.get(_plain(column), -1) for column in columns]
         if -1 not in picked:
             rows = [tuple(row[k] for k in picked) for row in table.rows]
-            found.append(TextTable(table.title, tuple(table.headings[k] for k in picked), rows))
+            found.append(TextTable(table.title, tuple(table.headings[k] for k in picked), rows, table.note))
     if not found:
         have = "; ".join(dict.fromkeys(", ".join(map(_plain, table.headings)) for table in tables))
         raise FieldError("columns", f"no table has {', '.join(columns)}; choose from {have}")
@@ -197,7 +211,8 @@ def write_latex(summary: CampaignSummary, out: Path, columns: Sequence[str] = ()
     lines = ["% antdrive report; needs \\usepackage{booktabs} and, for long tables, \\usepackage{longtable}"]
     for table in chosen_tables(all_cells(summary), columns):
         lines += ["", f"% {latex_text(table.title)}", *_latex_table(table, summary)]
-    lines += ["", *(f"% {latex_text(note)}" for note in (*summary.sentences, *summary.notes))]
+    lines += ["", *(f"{latex_text(sentence)}\n" for sentence in summary.sentences)]
+    lines += [f"% {latex_text(note)}" for note in summary.notes]
     return [write_text(out, "\n".join(lines).rstrip() + "\n")]
 
 
@@ -207,7 +222,7 @@ def _latex_table(table: TextTable, summary: CampaignSummary) -> list[str]:
 
     align = "".join("l" if heading in WORDS else "r" for heading in table.headings)
     counts = f"{amount(len(summary.table), 'run')} in {amount(len(summary.paired.worlds), 'world')}"
-    caption = f"\\caption{{{latex_text(f'{table.title} ({summary.title}: {counts}).')}}}"
+    caption = f"\\caption{{{latex_text(f'{table.title} ({summary.title}: {counts}). {table.note}'.strip())}}}"
     label = f"\\label{{tab:{re.sub('[^a-z0-9]+', '-', f'{summary.title} {table.title}'.lower()).strip('-')}}}"
     head, body = [r"\toprule", line(table.headings), r"\midrule"], [*map(line, table.rows), r"\bottomrule"]
     if len(table.rows) > LATEX_PAGE:

@@ -19,11 +19,12 @@
   }
   const text = (name, row) => (columns.has(name) ? columns.get(name).text(row) : "–"), good = (row) => data.good[row] === 1;
   const words = (row) => text("outcome", row).replaceAll("_", " ");
-  const badge = (row) => make("span", words(row) + (text("outcome", row) === "succeeded" && !good(row) ? ", not certified" : ""), "badge" + (good(row) ? " good" : /^(collided|invalid_plan)$/.test(text("outcome", row)) ? " hit" : ""));
+  const badge = (row) => make("span", words(row) + (text("outcome", row) === "succeeded" && !good(row) ? ", not certified" : ""), "badge" + (good(row) ? " good" : /^(collided|invalid_plan)|failed$/.test(text("outcome", row)) ? " hit" : ""));
   const planners = columns.get("planner"), numbers = new Map(data.planners.map((label, k) => [label, k]));
   const chip = (label) => { const found = make("span", undefined, "chip"); found.style.background = `var(--planner-${numbers.get(label) ?? 0})`; return found; };
 
-  const sectionOf = (row) => data.sections && $(`#run-${row}`);
+  const linksOf = (row) => (data.views[row] ? [["drive", data.views[row]]] : []);
+  const linked = ([name, href]) => { const found = make("a", name); found.href = href; return found; };
 
   // The runs: a sorted list of row numbers; the document holds the visible ones only.
   const HEIGHT = 34, box = $("#runs"), body = $("tbody", box), heads = [];
@@ -31,10 +32,9 @@
   let sorted = Uint32Array.from({ length: data.rows }, (_, k) => k), visible = sorted, drawn = "";
   const cell = (name, row) => {
     const found = make("td", undefined, columns.get(name).numeric ? "n" : "");
-    const section = name === "world" && sectionOf(row);
-    if (section) { const link = make("a", text(name, row)); link.href = `#${section.id}`; found.append(link); }
+    const [view] = name === "world" ? linksOf(row) : [];
+    if (view) found.append(linked([text(name, row), view[1]]));
     else if (name === "outcome") found.append(badge(row));
-    else if (name === "test") found.append(text(name, row) === "–" ? "" : make("span", text(name, row), "badge hit"));
     else if (name === "planner") found.append(chip(text(name, row)), text(name, row));
     else found.textContent = shown(name, row);
     found.title = found.textContent;
@@ -48,9 +48,11 @@
     drawn = state;
     const lines = document.createDocumentFragment();
     lines.append(gap(first));
-    for (let k = first; k < last; k++) { const line = make("tr"); line.dataset.row = visible[k]; for (const name of data.shown) line.append(cell(name, visible[k])); lines.append(line); }
+    for (let k = first; k < last; k++) { const line = make("tr"); line.dataset.row = visible[k]; line.tabIndex = 0; for (const name of data.shown) line.append(cell(name, visible[k])); lines.append(line); }
     lines.append(gap(visible.length - last));
+    const focused = body.contains(document.activeElement) && document.activeElement.dataset.row;
     body.replaceChildren(lines);
+    if (focused) $(`tr[data-row="${focused}"]`, body)?.focus({ preventScroll: true });
   };
   const redraw = () => { drawn = ""; draw(); };
   const sort = (name, down) => {
@@ -77,13 +79,12 @@
     if (outcome) tests.push(outcome === "failed" ? (row) => !good(row) : (row) => text("outcome", row) === outcome);
     visible = tests.length ? sorted.filter((row) => tests.every((fits) => fits(row))) : sorted;
     $("#count").textContent = `${visible.length.toLocaleString("en")} of ${data.rows.toLocaleString("en")} runs`;
-    if (data.sections) { const kept = new Set(visible); for (let row = 0; row < data.rows; row++) sectionOf(row).hidden = !kept.has(row); }
     box.scrollTop = 0;
     redraw();
   };
   for (const name of data.shown) {
     const head = make("th", undefined, columns.get(name).numeric ? "n" : ""), button = make("button", data.titles[name]);
-    button.type = "button"; head.dataset.name = name; head.setAttribute("aria-sort", "none"); head.append(button);
+    button.type = "button"; head.scope = "col"; head.dataset.name = name; head.setAttribute("aria-sort", "none"); head.append(button);
     button.addEventListener("click", () => sort(name, head.getAttribute("aria-sort") === "ascending"));
     heads.push(head); $("thead tr", box).append(head);
   }
@@ -99,7 +100,10 @@
   const repeat = (row) => {
     const found = document.createDocumentFragment(), command = text("command", row), log = text("rollout", row);
     if (command !== "–") found.append(make("pre", command));
-    if (log !== "–") { const link = make("a", log); link.href = data.base + log.split("/").map(encodeURIComponent).join("/"); found.append(link); }
+    if (log !== "–") found.append(linked([log, data.base + log.split("/").map(encodeURIComponent).join("/")]));
+    const files = make("p");
+    for (const link of linksOf(row)) files.append(linked(link), " ");
+    if (files.hasChildNodes()) found.append(files);
     return found;
   };
   const open = (...parts) => { $("div", dialog).replaceChildren(...parts); dialog.showModal(); dialog.scrollTop = 0; };
@@ -107,9 +111,17 @@
   const details = (row) => {
     const list = make("dl");
     for (const [name] of columns) if (!["command", "rollout", "reason"].includes(name) && text(name, row) !== "–") { const entry = make("div"); entry.append(make("dt", data.titles[name]), make("dd", text(name, row))); list.append(entry); }
-    open(make("h3", `${text("world", row)} · ${text("planner", row)} · seed ${text("seed", row)}`), badge(row), make("p", sentence(row)), repeat(row), list);
+    const found = data.details[row], why = make("ul", undefined, "why");
+    for (const reason of found ? found.why : []) why.append(make("li", reason));
+    open(make("h3", `${text("world", row)} · ${text("planner", row)} · seed ${text("seed", row)}`), badge(row), make("p", found ? found.told : sentence(row)), why, repeat(row), list);
   };
-  body.addEventListener("click", (event) => { const line = event.target.closest("tr[data-row]"); if (!line) return; const row = Number(line.dataset.row), section = sectionOf(row); if (section) section.scrollIntoView(); else details(row); });
+  const chosen = (event) => { const line = event.target.closest("tr[data-row]"); if (line && !event.target.closest("a")) details(Number(line.dataset.row)); };
+  body.addEventListener("click", chosen);
+  body.addEventListener("keydown", (event) => {
+    const next = event.target.matches("tr") && { ArrowDown: event.target.nextElementSibling, ArrowUp: event.target.previousElementSibling }[event.key];
+    if (next && next.dataset.row) { event.preventDefault(); next.focus(); }
+    else if (event.key === "Enter") chosen(event);
+  });
 
   // World by planner: a deeper colour for more failures.
   const matrix = (grid) => {
@@ -122,8 +134,8 @@
       if (bad.length) parts.splice(1, 0, make("p", "Run commands in the campaign's folder.", "small"));
       open(...parts);
     };
-    const head = make("tr"); head.append(make("th", "world"));
-    for (const label of labels) { const found = make("th"); found.append(make("span", label)); head.append(found); }
+    const head = make("tr"), corner = make("th", "world"); corner.scope = "col"; head.append(corner);
+    for (const label of labels) { const found = make("th"); found.scope = "col"; found.append(make("span", label)); head.append(found); }
     grid.createTHead().append(head);
     const lines = grid.createTBody(), share = (rows) => rows.filter(good).length / rows.length;
     const rowsOf = (k, label) => cells.get(`${k}\n${label}`) || [];
