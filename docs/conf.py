@@ -8,7 +8,7 @@ from importlib.metadata import version as version_of
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE / "_ext"))
+sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
 os.environ.setdefault("MPLBACKEND", "agg")
 
 project = "antdrive"
@@ -44,6 +44,7 @@ myst_heading_anchors = 4
 html_math_renderer = "mathml"  # what browsers draw themselves; MathJax would be loaded from the network
 
 # The API. Docstrings write `code` in single backticks.
+smartquotes = False  # they make one dash of the two before an option
 default_role = "code"
 antdrive_index_only = ["antdrive"]  # other pages describe what these offer
 add_module_names = False
@@ -51,6 +52,9 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
+# Types are shown by the names that signatures give them.
+_ALIASES = ["Floats", "Flags", "Ints", "Pose", "Point", "Bounds", "Cell", "Cells", "Mover"]
+autodoc_type_aliases = {name: name for name in _ALIASES}
 autodoc_class_signature = "mixed"
 python_maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
@@ -74,7 +78,10 @@ nitpick_ignore_regex = [
     ("py:class", r"antdrive\.runs\.campaigns\.job\.TaskOrigin"),
     ("py:class", "ErrorAt"),  # a type of functions
     ("py:class", r"antdrive\.foreign\.playback\.ForeignRollout"),  # one for which `certify` has a form of its own
-    ("py:class", r"Flags|antdrive\.base\.(registry\.Component|components\.Declared)"),  # an array, and type variables
+    (
+        "py:class",
+        r"Flags|Colour|antdrive\.base\.(registry\.Component|components\.Declared)",
+    ),  # an array, a colour, type variables
     ("py:.*", r"(gymnasium\.[\w.]+|ResetNeeded)"),
     # How a record's field is read from JSON.
     ("py:.*", r"antdrive\.[\w.]+\.(Annotated|_to_\w+)"),
@@ -98,7 +105,6 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "show_memory": False,
     "capture_repr": ("_repr_html_",),
-    "ignore_repr_types": "FilmInfo",  # the scraper shows films
     "remove_config_comments": True,
     "within_subsection_order": "antdrive_site.gallery_order",
     "plot_gallery": "True",
@@ -130,4 +136,5 @@ html_theme_options = {
     "pygments_light_style": "a11y-high-contrast-light",
     "pygments_dark_style": "a11y-high-contrast-dark",
     "show_toc_level": 2,
+    "collapse_navigation": True,  # else every page lists all classes of the API
 }

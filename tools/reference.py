@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import inspect
+import itertools
 import json
 import re
 import sys
@@ -18,6 +19,7 @@ from typing import Any
 
 from antdrive.base.records import meanings_of
 from antdrive.cli.listings import LISTED
+from tools.formulas import HTML, typeset
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -31,7 +33,7 @@ def cell(text: str) -> str:
     """Return a description as one cell of a Markdown table: one line, no pipe, no emphasis, no HTML outside code."""
     parts = re.split(r"(`[^`]*`)", " ".join(text.split()))
     plain = [one if one.startswith("`") else re.sub(r"([*<])", r"\\\1", one) for one in parts]
-    return "".join(plain).replace("|", "\\|")
+    return typeset("".join(plain).replace("|", "\\|"), HTML)
 
 
 def code(text: object) -> str:
@@ -230,24 +232,56 @@ def counterparts() -> list[str]:
     return table("Nav2, antdrive", [(code(name), text) for name, text in NAV2.items()])
 
 
-def _picture(folder: str, name: str) -> str:
-    path = f"../pictures/{folder}/{name}.webp"
-    return f"![{name}]({path})" if (DOCS / "reference" / path).exists() else ""
+#: What each world of the catalogue is for. hasan's twelve say which figure of the paper they recreate.
+PURPOSES = {
+    "empty": "the controller alone; obstacles that you add with `--unseen`",
+    "forest": "first drives, and planners side by side: many ways around scattered cylinders",
+    "gate": "tight passages: the jackal fits the one gap of 0.8 m with 0.067 m to spare on each side",
+    "han2007-aco": "repeating Han's ant colony: the 14 discs of its listing",
+    "han2007-ga": "repeating Han's genetic algorithm: the 6 discs of its listing",
+    "han2007-single": "the simplest detour: one disc of radius 2.5 m between start and goal",
+    "no-path": "the answer *no path*: a closed ring around the goal",
+    "office": "long routes through ten rooms along a corridor, with doors of 0.85 to 2 m",
+    "people-aisle": "a crossing at the end of an aisle: a person walks to and fro between shelves, 10 m ahead",
+    "people-corridor": "passing in a corridor of 2.4 m: a person comes towards the robot",
+    "people-crossing": "crossing traffic: five people cross the robot's way",
+    "people-doorway": "giving way: a person comes through the only door as the robot arrives",
+    "plaza-moving": "avoidance and replanning: six movers of every kind among four columns",
+    "slalom": "tracking: tight turns around four walls, open in turn",
+    "u-trap": "local minima: the goal lies behind a U that opens towards the start",
+}
 
 
 def worlds() -> list[str]:
-    """Return each world of the catalogue with its size, content and picture."""
+    """Return each world of the catalogue with its picture, purpose, size and content."""
+    from antdrive.base.files import summary_of
     from antdrive.worlds import list_worlds, load_task
 
-    def row(name: str) -> Row:
+    def row(name: str, path: Path) -> Row:
         world = load_task(name).world
         size = "\u00a0×\u00a0".join(f"{side:g}" for side in world.size) + "\u00a0m"
-        counts = str(len(world.obstacles)), str(len(world.movers))
-        source = (world.source or "").removeprefix("made for antdrive; ").partition("; ")[0]
-        source = re.sub(r"(?<=worlds\.forest)\(.*\)", "", source)
-        return code(name), _picture("worlds", name), size, *counts, cell(source)
+        purpose = PURPOSES.get(name) or _of_hasan(name, world.source or "")
+        picture = f"![Map of {name}: {summary_of(path)}](../pictures/worlds/{name}.webp)"
+        return code(name), picture, purpose, size, str(len(world.obstacles)), str(len(world.movers))
 
-    return table("world, picture, size, cylinders, movers, source", map(row, list_worlds()))
+    rows = table("world, picture, for, size, cylinders, movers", itertools.starmap(row, list_worlds().items()))
+    han, hasan = (re.split(r";|, Fig\.", load_task(name).world.source or "")[0] for name in ("han2007-aco", "hasan-1a"))
+    return [
+        *rows,
+        f"`han2007-*`: {han}. `hasan-*`: {hasan}. `forest` follows Han's rule; the others are antdrive's own.",
+        "",
+    ]
+
+
+def _of_hasan(name: str, source: str) -> str:
+    found = re.search(r"Fig\. (\w+): ([^;]+)", source)
+    if not found:
+        raise KeyError(f"{name}: add what it is for to PURPOSES")
+    return (
+        f"hasan, Fig. {found[1]}: {found[2]}"
+        if "-moving" not in name
+        else f"the same, with the paper's mover (Fig. {found[1]})"
+    )
 
 
 def robots() -> list[str]:
@@ -261,16 +295,13 @@ def robots() -> list[str]:
         sensor = f"{lidar.rate:g} Hz, {lidar.max_range:g} m" if lidar else "none"
         top = f"{robot.max_speed:g} m/s, {robot.max_yaw_rate:g} rad/s"
         after = re.split(r"[:;(]|\. |, (?=[a-z\d])", " ".join((robot.source or "").split()))[0]
-        return (
-            code(name),
-            _picture("robots", name),
-            cell(footprint_text(robot.footprint)),
-            top,
-            sensor,
-            cell(after.strip().removeprefix("After ")),
-        )
+        shape = footprint_text(robot.footprint)
+        wheels = f"wheels {robot.track:g} m apart"
+        picture = f"![Footprint of {name} from above: {shape}, {wheels}](../pictures/robots/{name}.svg)"
+        texts = (re.sub(r"(?<=\d) (?=(?:m|Hz|rad)\b)", "\u00a0", cell(text)) for text in (shape, top, sensor))
+        return code(name), picture, *texts, cell(after.strip().removeprefix("After "))
 
-    return table("robot, picture, footprint, top speeds, lidar, source", map(row, list_robots()))
+    return table("robot, footprint, shape, top speeds, lidar, source", map(row, list_robots()))
 
 
 def arrays() -> list[str]:

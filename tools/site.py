@@ -1,12 +1,13 @@
 """Check the built site: `python -m tools.site docs/_build/html`.
 
 Internal links and anchors must resolve. Pages load no external resources. The first page loads less than 3 MB, including its
-hero film. Films are under 1 MB.
+hero film. Films are under 1 MB. Searches find their pages, if playwright and Chromium are there; else a line says that none was
+tried.
 
 `--browser` opens every page from the disk in Chromium, light at desktop width and dark at phone width. It reports console
-errors, exceptions, images and films that do not load or play, low contrast, and pages wider than the window. Test searches
-must find their pages. `--shots FOLDER` saves screenshots of each page, light and dark, wide and narrow. This needs
-`pip install playwright` and Chromium: the one on the path, or `playwright install chromium`.
+errors, exceptions, images and films that do not load or play, low contrast, and pages wider than the window. `--shots FOLDER`
+saves screenshots of each page, light and dark, wide and narrow. This needs `pip install playwright` and Chromium: the one on
+the path, or `playwright install chromium`.
 """
 
 from __future__ import annotations
@@ -30,6 +31,10 @@ CONTRAST = 3.0  # least contrast of text and background; WCAG requires 4.5 for s
 #: Searches, each with the page of the first result.
 ASKED = {
     "replan": "how-to/",
+    "certificate": "explanation/certificate",
+    "footprint": "reference/robots",
+    "custom planner": "tutorials/your-own-planner",
+    "docker": "how-to/install",
     "campaign": "how-to/campaigns",
     "pure pursuit": "explanation/following",
     "lidar": "explanation/unknown-worlds-sensing",
@@ -71,7 +76,7 @@ PROBE = """async () => {
     const layers = [];
     for (let e = element; e; e = e.parentElement) {
       const style = getComputedStyle(e);
-      if (style.backgroundImage !== "none") return null;
+      if (style.backgroundImage.includes("url(")) return null;
       const colour = rgba(style.backgroundColor);
       if (colour[3] > 0) layers.push(colour);
       if (colour[3] === 1) break;
@@ -180,11 +185,16 @@ class Looking:
 
     def _window(self, browser: Any, theme: str, width: int) -> Any:
         window = browser.new_context(viewport={"width": width, "height": HIGH}, color_scheme=theme).new_page()
-        window.on("console", lambda said: said.type in ("error", "warning") and self._note(f"console: {said.text}"))
+        window.on("console", self._said)
         window.on("pageerror", lambda error: self._note(f"exception: {error}"))
         aborted = "net::ERR_ABORTED"  # a film that is not loaded to its end
         window.on("requestfailed", lambda it: it.failure == aborted or self._note(f"{it.url}: {it.failure}"))
         return window
+
+    def _said(self, message: Any) -> None:
+        # Chromium itself says it where it draws without a GPU.
+        if message.type in ("error", "warning") and "GPU stall due to ReadPixels" not in message.text:
+            self._note(f"console: {message.text}")
 
     def _note(self, fault: str) -> None:
         self.faults.append(fault)
@@ -218,22 +228,33 @@ class Looking:
         return found
 
 
+def missing_browser() -> str:
+    """Return what is missing to open pages, and how to get it; empty if nothing is."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        return "playwright is missing: pip install playwright"
+    with sync_playwright() as playwright:
+        found = any(map(shutil.which, BROWSERS)) or Path(playwright.chromium.executable_path).exists()
+    return "" if found else "chromium is missing: playwright install chromium, or apt-get install chromium"
+
+
 def opened(playwright: Any) -> Any:
     """Launch the Chromium on the path, or playwright's own."""
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
     return playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
 
 
-def look(site: Path, shots: Path | None) -> list[str]:
-    """Return a site's problems in a browser, one line each."""
+def look(site: Path, shots: Path | None, pages: bool = True) -> list[str]:
+    """Return a site's problems in a browser, those of the search alone or of all pages, too, one line each."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
         browser = opened(playwright)
         looking = Looking(browser, site, shots)
         found = looking.search()
-        for page in sorted(path for path in site.rglob("*.html") if "_static" not in path.parts):
-            found += looking.page(page)
+        for page in sorted(site.rglob("*.html")) if pages else ():
+            found += looking.page(page) if "_static" not in page.parts else []
         browser.close()
     return found
 
@@ -247,14 +268,16 @@ def main(words: list[str]) -> int:
     given = asked.parse_args(words)
     site = given.site.resolve()
     found = problems_of(site)
-    if given.browser or given.shots:
-        if given.shots:
-            given.shots.mkdir(parents=True, exist_ok=True)
-        try:
-            found += look(site, given.shots)
-        except ImportError:
-            sys.stderr.write("playwright is missing: pip install playwright\n")
+    if given.shots:
+        given.shots.mkdir(parents=True, exist_ok=True)
+    asked_for = given.browser or given.shots is not None
+    missing = missing_browser()
+    if missing:
+        sys.stderr.write(f"{missing}\n" if asked_for else f"The site's search was not tried: {missing}\n")
+        if asked_for:
             return 2
+    else:
+        found += look(site, given.shots, pages=asked_for)
     sys.stdout.write(("\n".join(found) or f"{given.site}: no problems") + "\n")
     return int(bool(found))
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+DRIVES = "_drives"  # where pages of drives are in the site
+#: Pictures of drives that have a page in the site.
+SHOWN = [name for name, one in json.loads((ROOT / "docs/pictures/drives.json").read_text()).items() if "page" in one]
 #: Files of the repository that a page includes.
 PAGES = {
     "README.md": "index",
@@ -20,7 +24,9 @@ PAGES = {
 
 
 def adapted(text: str, here: Path, docs: Path) -> str:
-    """A page's text with links to files outside docs/ made links within the site, and with its comments on blocks visible.
+    """A page's text with links to files outside docs/ and to classes leading to the site's pages, and visible comments on blocks.
+
+    Pictures of drives lead to the drives' own pages.
 
     Args:
         text: the page, in Markdown
@@ -36,7 +42,21 @@ def adapted(text: str, here: Path, docs: Path) -> str:
         target = ROOT / "docs" / f"{page}.md" if page else target / "README.md" if target.is_dir() else target
         return f"]({os.path.relpath(target, docs)}{match[2] or ''})"
 
+    def described(match: re.Match[str]) -> str:
+        page = f"{match[2]}/{match[1]}.rst"
+        return f"[`{match[1]}`]({page})" if (docs / page).exists() else match[0]
+
+    def opens(match: re.Match[str]) -> str:
+        name = match[3] if match[3] in SHOWN else "drive"
+        about = f":alt: {match[1]}\n:class: {match[4] or 'antdrive-drive'}\n:target: {pages}/{name}.html"
+        return f"```{{image}} {match[2]}\n{about}\n```"
+
+    pages = f"{os.path.relpath(ROOT / 'docs', docs)}/{DRIVES}"
+    picture = rf"^!\[(.+?)\]\((\S*pictures/({'|'.join((*SHOWN, 'hero', 'view'))})\.webp)\)(?:{{\.(\S+)}})?$"
+    text = re.sub(picture, opens, text, flags=re.MULTILINE)
+    text = re.sub(r"\[([^][]+)\]\(\S*pictures/drive\.html\)", rf'<a href="{pages}/drive.html">\1</a>', text)
     text = re.sub(r"\]\(([^)#\s:]+)(#[^)\s]*)?\)", link, text)
+    text = re.sub(r"\[`(\w+)`\]\(([^)#\s:]*reference/api/[\w-]+)\.md\)", described, text)
     text = re.sub(
         r"^<!-- file: (.+?) -->\n(```+)(\w+)\n", r"\2{code-block} \3\n:caption: \1\n\n", text, flags=re.MULTILINE
     )

@@ -1,4 +1,4 @@
-"""Sphinx extension of the site: drawn figures, films, adapted pages, MathML.
+"""Sphinx extension of the site: drawn figures, pages of drives, adapted pages, MathML.
 
 `{drawn} TEXT` runs its content, which leaves a matplotlib figure in `figure`, and shows the figure with the caption TEXT
 above the code.
@@ -16,18 +16,19 @@ import weakref
 from pathlib import Path
 from typing import Any
 
-import imageio.v3 as imageio
-import imageio_ffmpeg
-from antdrive_links import adapted
+import numpy as np
+from antdrive_links import DRIVES, adapted
 from docutils import nodes
 from docutils.utils.math import latex2mathml
 from matplotlib.figure import Figure
+from PIL import Image
 from sphinx.application import Sphinx
-from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
-FILMS = "_films"  # where films are in the site
-HEAVIEST = 1_000_000  # what a film may weigh [B]
+from antdrive.sim.log.packing import MARK
+from antdrive.sim.log.rollout import Rollout
+from antdrive.views.film.shot import Shot
+
 _drawn: weakref.WeakSet[Figure] = weakref.WeakSet()
 
 
@@ -54,27 +55,32 @@ class Drawn(SphinxDirective):
 
 
 def scrape(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
-    """The reST that shows what a block of the gallery has filmed, by `film(..., "name.mp4")`, and drawn."""
+    """The reST that shows what a block of the gallery has driven, by `write_view(..., "name.html")`, and drawn."""
     names, source = block_vars["image_path_iterator"], Path(gallery_conf["src_dir"])
+    title = Path(block_vars["src_file"]).read_text(encoding="utf-8").strip('"\n').partition("\n")[0]
     folder, shown = Path(block_vars["src_file"]).parent, []
-    # Other examples may be filming in the same folder, so names are read from the block.
-    for film in [folder / name for name in re.findall(r'"([\w-]+\.mp4)"', block[1]) if (folder / name).exists()]:
-        if film.stat().st_size > HEAVIEST:
-            raise ExtensionError(f"{film.name}: more than {HEAVIEST} bytes; film it smaller or faster")
-        poster = Path(next(names))
-        target = Path(shutil.move(film, poster.with_suffix(".mp4")))
-        frames, _ = imageio_ffmpeg.count_frames_and_secs(str(target))
-        imageio.imwrite(poster, imageio.imread(target, index=frames * 2 // 3, plugin="FFMPEG"))
-        files = f'src="../{FILMS}/{target.name}" poster="../{FILMS}/{poster.name}" aria-label="A film of the drive"'
-        video = f'<video class="antdrive-film" controls muted loop playsinline preload="none" {files}></video>'
-        shown.append(f".. raw:: html\n\n   {video}\n")
+    # Other examples may be driving in the same folder, so names are read from the block.
+    for driven in [folder / name for name in re.findall(r'"([\w-]+\.html)"', block[1]) if (folder / name).exists()]:
+        poster, target = Path(next(names)), source / "_build" / "drives" / driven.name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(driven, target)
+        count = target.read_bytes().count(MARK)
+        first, *others = logs = [Rollout.load(f"{target}#{k}") for k in range(1, count + 1)]
+        shot = Shot({log.record.planner.name: log for log in logs} if others else first, size=(800, 450))
+        Image.fromarray(shot.frame(float(first.t[np.argmin(first.clearance)]))).save(poster)
+        where = poster.relative_to(source).as_posix()
+        about = f":alt: {title}: replay of {driven.stem.removeprefix('gallery-')}"
+        about = f"   {about}\n   :target: ../{DRIVES}/{driven.name}\n"
+        shown.append(f".. image:: /{where}\n{about}")
     for figure in [value for value in block_vars["example_globals"].values() if isinstance(value, Figure)]:
         if figure not in _drawn:
             _drawn.add(figure)
             path = Path(next(names))
             figure.savefig(path, dpi=110, facecolor="white")
             where = path.relative_to(source).as_posix()
-            shown.append(f".. image:: /{where}\n   :alt: A figure that the lines above draw\n")
+            titles = filter(None, [figure.get_suptitle(), *(axes.get_title() for axes in figure.axes)])
+            about = " ".join(next(titles, "figure").replace("$", "").split())
+            shown.append(f".. image:: /{where}\n   :alt: {title}: {about}\n")
     return "\n" + "\n".join(shown) + "\n"
 
 
@@ -91,13 +97,13 @@ def gallery_order(name: str) -> tuple[int, str]:
     return LEADING.index(stem) if stem in LEADING else len(LEADING), stem
 
 
-def films_copied(app: Sphinx, exception: Exception | None) -> None:
-    """Put films and posters into the site."""
+def drives_copied(app: Sphinx, exception: Exception | None) -> None:
+    """Put the pages of drives into the site."""
     if exception is None and app.builder.format == "html":
-        for film in Path(app.srcdir).glob("_gallery/images/*.mp4"):
-            for file in (film, film.with_suffix(".png")):
-                (Path(app.outdir) / FILMS).mkdir(exist_ok=True)
-                shutil.copyfile(file, Path(app.outdir) / FILMS / file.name)
+        docs = Path(app.srcdir)
+        (Path(app.outdir) / DRIVES).mkdir(exist_ok=True)
+        for page in [docs / "pictures" / "drive.html", *(docs / "_build" / "drives").glob("*.html")]:
+            shutil.copyfile(page, Path(app.outdir) / DRIVES / page.name)
 
 
 def page_read(app: Sphinx, docname: str, source: list[str]) -> None:
@@ -126,11 +132,45 @@ def block(self: Any, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
+#: What readers of screens and keyboards miss in the theme's HTML, and its replacement.
+MENDED = (
+    (r'<th (?=class="head)', '<th scope="col" '),
+    (r'<th (?=class="stub)', '<th scope="row" '),
+    (r'<table (?=class="table)|<div (?=class="math")', r'\g<0>tabindex="0" '),  # what scrolls
+    (r'<dl>(?=\n<dd><em class="sig-param")', '<dl role="none">'),  # no list of definitions
+    (r'<dd>(?=<em class="sig-param")', '<dd role="none">'),
+    (r"(</strong>(?:</a>)?(?: \([^\n]{0,900}?\))?) -- ", r"\1 – "),  # names of arguments
+)
+
+
+def page_written(
+    app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: nodes.document | None
+) -> None:
+    """Mend a page's HTML, and name what opens parts of the list of pages."""
+    if doctree is not None:
+        for found, better in MENDED:
+            context["body"] = re.sub(found, better, context["body"])
+        listed = context["generate_toctree_html"]
+        named = '<summary aria-label="more pages">'
+        context["generate_toctree_html"] = lambda *words, **options: str(listed(*words, **options)).replace(
+            "<summary>", named
+        )
+
+
+def keywords_added(app: Sphinx, doctree: nodes.document) -> None:
+    """Let searches for a custom planner find Your own planner."""
+    title = next(iter(doctree.findall(nodes.title)), None)
+    if title is not None and title.astext().startswith("Your own"):
+        doctree.append(nodes.meta(name="keywords", content="custom"))
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register all of it."""
     app.add_directive("drawn", Drawn)
     app.add_html_math_renderer("mathml", (inline, None), (block, None))
     app.connect("source-read", page_read)
     app.connect("include-read", include_read)
-    app.connect("build-finished", films_copied)
+    app.connect("doctree-read", keywords_added)
+    app.connect("html-page-context", page_written, priority=900)  # after the theme
+    app.connect("build-finished", drives_copied)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

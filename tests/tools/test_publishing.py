@@ -55,5 +55,6 @@ def test_make_dist_checks_metadata_and_the_commands_of_a_newcomer():
 
 
 def test_an_index_shows_the_readme_without_pictures_and_links_of_the_repository():
-    text = "A\n\n![a robot](docs/a.webp)\n\n*Caption.*\n\nB [c](docs/d.md), [e](https://example.org)\n"
+    table = "| a | b |\n|---|---|\n| [![a](docs/a.webp)](docs/a.html) | ![b](docs/b.webp) |\n\n*Two\nlines.*\n\n"
+    text = f"A\n\n![a robot](docs/a.webp)\n\n*Caption.*\n\n{table}B [c](docs/d.md), [e](https://example.org)\n"
     assert readme_of(text) == "A\n\nB c, [e](https://example.org)\n"

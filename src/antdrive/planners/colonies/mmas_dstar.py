@@ -30,8 +30,8 @@ ONLINE_FACTOR = 2.0  # factor on alpha per cycle of an agent; large, because the
 class MaxMinDStar(GridPlanner):
     """One ant follows pheromone spread from the goal like D*'s costs.
 
-    hasan's improved max-min algorithm: the ant always takes the neighbour with the smallest `pheromone^alpha *
-    distance^beta`, the numerator of eq. 1. The paper's listing (l. 193-195) divides this product by itself, for blocked
+    hasan's improved max-min algorithm: the ant always takes the neighbour with the smallest pheromone^alpha
+    distance^beta, the numerator of eq. 1. The paper's listing (l. 193-195) divides this product by itself, for blocked
     cells only; the text (l. 161) has the minimum, for free ones. Because of the straight distance to the goal, the ant
     may cycle in front of a wall. The author chose other exponents for such maps; here the rule `exponents` serves all
     maps, and the ant always arrives. The result's `reason` reports the changes. Max-min ants' bounds, deposits of the
@@ -172,7 +172,7 @@ class MaxMinDStar(GridPlanner):
 class PheromoneAgent(SteppingAgent):
     """hasan's robot: it decides once per cell, by pheromone spread once from the goal, and never enters an occupied cell.
 
-    The robot moves to the allowed neighbour with the smallest `pheromone^alpha * distance^beta`. Before it returns
+    The robot moves to the allowed neighbour with the smallest pheromone^alpha distance^beta. Before it returns
     to a cell visited with the current exponents, it detects a cycle and takes the next exponents of
     `MaxMinDStar.exponents`: alpha doubles. If movers keep it waiting, it respreads pheromone around them. The paper's robot
     has neither rule. It knows cells, not headings, so it moves for the disc around the robot.
