@@ -296,6 +296,7 @@ def test_integration_builds_the_site_where_python_is_new_enough_and_tests_anothe
         (tmp_path / folder).mkdir()
     for name in (".ci/run", "tools/find-python"):
         shutil.copy(SCRIPT.parent.parent / name, tmp_path / name)
+    script(tmp_path / ".ci" / "browser", "#!/bin/sh\n")
     answers = f'*">= (3, 11)"*) exit {int(fits)} ;; tools.loop) shift 2; echo "$*" ;;'
     script(tmp_path / "python", f'#!/bin/sh\ncase "$2" in {answers} esac\n')
     other = tmp_path / "versions" / "3.13.9" / "bin" / "python"
@@ -306,6 +307,23 @@ def test_integration_builds_the_site_where_python_is_new_enough_and_tests_anothe
     again = f"make VENV=.venv-3.13 PYTHON={other} test"
     assert done.stdout.splitlines()[-1].split(" -- ")[2:] == ["make test", "make test-slow", last, again]
     assert ("needs Python 3.11" in done.stdout) is not fits
+    script(tmp_path / ".ci" / "browser", "#!/bin/sh\necho NO BROWSER\n")
+    done = subprocess.run([tmp_path / ".ci" / "run"], env=environment, capture_output=True, text=True, check=True)
+    lines = done.stdout.splitlines()
+    assert (lines[0], lines[-1], lines.count("NO BROWSER")) == ("NO BROWSER", "NO BROWSER", 2)
+
+
+@pytest.mark.parametrize("said", [True, False], ids=["apt-get fails", "apt-get installs"])
+def test_integration_installs_a_browser_or_says_what_is_skipped(tmp_path, said):
+    for name in ("bash", "env", "timeout", "chmod"):
+        (tmp_path / name).symlink_to(str(shutil.which(name)))
+    script(tmp_path / "id", "#!/bin/sh\necho 0\n")
+    fake = "printf '#!/bin/sh\\n' > {0}; chmod +x {0}".format(tmp_path / "chromium")
+    script(tmp_path / "apt-get", f"#!/bin/bash\n{'exit 1' if said else fake}\n")
+    browser = SCRIPT.parent.parent / ".ci" / "browser"
+    done = subprocess.run([browser], env={"PATH": str(tmp_path)}, capture_output=True, text=True, check=True)
+    assert ("NO BROWSER: tests of pages" in done.stdout) is said
+    assert "Installing chromium" in done.stderr
 
 
 def test_commands_are_timed_in_loops_until_one_fails(monkeypatch, capsys):

@@ -10,8 +10,7 @@ from antdrive.cli.commands.worlds import import_world
 from antdrive.robots import LIMITERS
 from antdrive.robots.control import _kernels_pursuit as rules
 from antdrive.sim.log.metrics import METRICS
-from antdrive.views.colours import OUTCOME_LABELS
-from antdrive.views.figures.run_figures import LIMITER_COLOURS
+from antdrive.views.colours import LIMITER_COLOURS, OUTCOME_LABELS
 from antdrive.worlds import IMPORTS
 
 ROOT = Path(__file__).parent.parent

@@ -243,7 +243,7 @@ def twice(self, *args):
 _kernels_dispatcher._Uncompiled.__call__ = twice
 for name in PLANNERS:
     warming.plan_with(name)
-warming.drive_and_film()
+warming.drive()
 run(Scenario.of("forest", "astar"))
 run(Scenario.of("forest", "dstar-lite", map="none", time_limit=6.0))
 run(Scenario.of("plaza-moving", "dstar-lite", time_limit=6.0))

@@ -32,6 +32,7 @@ ALLOWED = {
     "base/process_state.py": {"os.fdopen"},
     "cli/app.py": {"open", "os.open", "os.fdopen"},
     "cli/commands/init.py": {"source.read_text"},
+    "cli/commands/view.py": {"webbrowser.open"},
     "cli/commands/robots.py": {"known[name].read_text"},
     "cli/listings.py": {"LISTED.read_text"},
     "testing/session_summary.py": {"open"},
@@ -52,8 +53,10 @@ ALLOWED = {
         "Path(__file__).with_name('layout.json').read_text",
     },
     "views/export/topics.py": {"path.open"},
-    "views/pages/attachments.py": {"Image.open"},
     "views/pages/tables.py": {"temporary.open"},
+    "views/viewer/drive_page.py": {
+        *("ASSETS / 'page.css'.read_text", "ASSETS / 'page.html'.read_text", "ASSETS / f'{name}.js'.read_text"),
+    },
     "worlds/formats/map_server.py": {"part.write_bytes", "Image.open"},
     "worlds/formats/movingai.py": {"part.write_text"},
 }

@@ -41,7 +41,9 @@ def test_the_help_of_every_command_is_as_recorded(antdrive, monkeypatch, file_re
     monkeypatch.setenv("COLUMNS", "80")
     texts = [antdrive(*words, "--help") for words in every_command(application())]
     assert {(code, err) for code, _, err in texts} == {(0, "")}
-    file_regression.check("\n".join(out for _, out, _ in texts), basename="help")
+    told = "\n".join(out for _, out, _ in texts)
+    assert [line for line in told.splitlines() if len(line) > 80] == []
+    file_regression.check(told, basename="help")
 
 
 @pytest.mark.parametrize("name", [*COMMANDS, *(f"worlds {name}" for name in WORLDS)])

@@ -145,14 +145,14 @@ def forget():
 
 def reports(antdrive, pytester):
     """The texts of a check: printed, as JSON, as JUnit and of pytest."""
-    words = ("check", "s.drive.yaml", "--jobs", "1", "--film", "never", "--plan-limit", "0.2")
+    words = ("check", "s.drive.yaml", "--jobs", "1", "--plan-limit", "0.2")
     _, out, _ = antdrive(*words)
     yield out
     _, out, _ = antdrive(*words, "--json", "--junit", "j.xml")
     (test,) = json.loads(out)["tests"]
     yield "\n".join((*test["faults"], *test["details"]))
     yield ET.parse(pytester.path / "j.xml").find(".//failure").text
-    plugin = ("-p", "antdrive.testing.plugin", "-p", "no:cacheprovider", "--drive-film=never")
+    plugin = ("-p", "antdrive.testing.plugin", "-p", "no:cacheprovider")
     yield pytester.runpytest_inprocess(*plugin, "--drive-plan-limit", "0.2").stdout.str()
 
 
@@ -200,7 +200,7 @@ def test_a_planner_that_depends_on_the_order_of_a_set_is_named(folder, monkeypat
     monkeypatch.delenv("PYTHONHASHSEED", raising=False)
     for words in (
         "accept s.drive.yaml",
-        "check s.drive.yaml --film never",
+        "check s.drive.yaml",
         "run w.yaml -r r.yaml -p mine.py:Mine -o out --no-figures",
     ):
         done = subprocess.run([ANTDRIVE, *words.split()], capture_output=True, text=True, timeout=100)

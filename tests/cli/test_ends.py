@@ -71,7 +71,7 @@ def test_each_run_of_a_comparison_says_how_to_repeat_it(antdrive, office):
     )  # fmt: skip
     assert code == 0
     command = json.loads(Path("c/astar/result.json").read_text())["command"]
-    assert "--task=dock --start=0.6,1.0,0.0 --planner astar" in command
+    assert "--task=dock --start=0.6,1,0 --planner astar" in command
 
 
 def test_a_sweep_drives_the_tasks_of_a_file(antdrive, office):

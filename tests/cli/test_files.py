@@ -25,6 +25,8 @@ READERS = {
     "barn FILE": "worlds.tar.xz",
     "barn folder": "folder/worlds.tar.xz",
     "barn paths": "paths/path_1.npy",
+    "view FILE -o new.html": "a.npz",
+    "view runs -o new.html": "runs/rollout.npz",
     "render FILE -o new.mp4": "a.npz",
     "render runs -o new.mp4": "runs/rollout.npz",
     "report runs -o new.html": "runs/result.json",

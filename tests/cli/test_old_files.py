@@ -96,7 +96,7 @@ def test_an_old_campaign_is_reported_on(antdrive, old):
 def check(antdrive, old):
     """Check the old suite: what `--json` prints, and the folder of its baselines."""
     suite = (old / "suite" / "old.yaml").rename(old / "suite" / "old.drive.yaml")  # which pytest would collect
-    words = ("--json", "-j", 1, "--strict", "--film", "never", "--results", "results")
+    words = ("--json", "-j", 1, "--strict", "--results", "results")
     return lambda: json.loads(antdrive("check", suite, *words)[1]), suite.parent / "baselines" / "old"
 
 

@@ -42,6 +42,9 @@ INVALID = [
     "shrink nowhere -o OUT",
     "reproduce nosuch -o OUT",
     "check nowhere.drive.yaml -o OUT",
+    "view nowhere -o OUT.html",
+    "view drive drive drive drive drive -o OUT.html",
+    "view drive --label one --label two -o OUT.html",
     "render nowhere -o OUT.mp4",
     "render drive -o OUT.doc",
     "render drive --camera wise -o OUT.mp4",
@@ -74,6 +77,7 @@ WRITING = [
     "falsify --budget 1 -o OUT",
     "shrink drive -o OUT",
     "reproduce lee2008 --quick -o OUT",
+    "view drive -o OUT.html",
     "render drive -o OUT.png",
     "report drive -o OUT.html",
     "export drive -o OUT.mcap",
@@ -104,7 +108,7 @@ def test_every_command_that_takes_an_output_is_called():
 def made(small_run, tmp_path_factory):
     """A folder with a drive, an archive of worlds and a broken map."""
     folder = tmp_path_factory.mktemp("made")
-    write_run(small_run, folder / "drive", "antdrive run", figures=False)
+    write_run(small_run, folder / "drive", "antdrive run", formats=None)
     (folder / "wrong.map").write_text("type octile\n")
     (folder / "track.csv").write_text("t,x,y,yaw\n0,1,1,0\n0.1,1.02,1,0\n")
     assert exit_code_of(["worlds", "export", "empty", "-o", str(folder / "world.sdf")]) == 0
@@ -172,7 +176,7 @@ def test_a_second_run_that_does_not_fit_leaves_the_first(limited, antdrive, smal
     assert {path.name: path.read_bytes() for path in Path("r").iterdir()} == before
 
 
-SAVED = "; saved: r/result.json, r/rollout.npz\n"
+SAVED = "; saved: r/result.json, r/rollout.npz, r/drive.html\n"
 
 
 @pytest.mark.parametrize("view", ["film", "figure"])
@@ -188,9 +192,9 @@ def test_a_finished_drive_stays_without_space_for_its_views(refused, antdrive, s
         monkeypatch.setattr("matplotlib.figure.Figure.savefig", full)
         said = refused("run", small, "-o", "r")
         assert said == "antdrive: r/overview.png: cannot be written (No space left on device)" + SAVED
-    assert sorted(path.name for path in Path("r").iterdir()) == ["result.json", "rollout.npz"]
+    assert sorted(path.name for path in Path("r").iterdir()) == ["drive.html", "result.json", "rollout.npz"]
     facts = json.loads(Path("r/result.json").read_text())
-    assert facts["files"] == {"result": "r/result.json", "rollout": "r/rollout.npz"}
+    assert facts["files"] == {"result": "r/result.json", "rollout": "r/rollout.npz", "page": "r/drive.html"}
     assert antdrive("verify", "r")[0] == 0
 
 

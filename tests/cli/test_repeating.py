@@ -24,7 +24,7 @@ def test_the_command_of_a_log_repeats_its_drive(antdrive, tmp_path, world):
     log = run(Scenario(task=task, planner=planner, planner_name="aco-han", robot=load_robot("jackal"), **given)).rollout
     command = command_of(log.record)
     assert command.startswith(
-        f"antdrive run {'empty --goal=4.0,3.0' if world == 'empty' else 'own.yaml'} --planner aco-han"
+        f"antdrive run {'empty --goal=4,3' if world == 'empty' else 'own.yaml'} --planner aco-han"
     )
     antdrive(*shlex.split(command)[1:], "--no-figures", "--out", tmp_path / "again")
     assert Rollout.load(tmp_path / "again" / "rollout.npz").digest == log.digest

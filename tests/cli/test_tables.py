@@ -21,7 +21,7 @@ RANGE = "16.996 (16.873 to 17.402)"
 LONG = "the plan leads through a place that is 0.8 m wide, and the robot with its margin needs 0.81 m"
 #: A table of each command that prints one, with cells of usual lengths.
 TABLES = {
-    "compare": (Comparison((), ()).headings, [("aco-han", "20.341 → 19.871", "31.20", "0.031", "0.028", LONG)]),
+    "compare": ((*Comparison((), ()).headings, "outcome"), [("aco-han", "20.341 → 19.871", "31.20", "0.031", "0.028", LONG)]),
     "compare: differences": (("planner", "succeeded", "pairs", *COMPARED.values()), [("astar", "9 of 10", "9", *[RANGE] * 4)]),
     "compare: pairs": (
         ("first", "second", "lower", "difference", "95 % interval", "p (Holm)", "effect", "pairs", "less", "more", "ties"),

@@ -223,7 +223,7 @@ def test_suites_name_it_and_go_on(folder):
     names = ("Exits", "Endless", "Right")
     tests = "\n".join(f"  {n.lower()}: {{world: short.yaml, planner: 'mine.py:{n}', baseline: false}}" for n in names)
     (folder / "a.drive.yaml").write_text(f"schema: 1\nscenarios:\n{tests}\n")
-    done = process("check", "a.drive.yaml", "--jobs", "2", "--film", "never", "--results", "results", limit="3")
+    done = process("check", "a.drive.yaml", "--jobs", "2", "--results", "results", limit="3")
     assert done.returncode == 1
     assert "planner Exits (mine.py:7) ended the process with exit code 0" in done.stdout
     assert "planner Endless took longer than the limit of 3 s (mine.py:15)" in done.stdout

@@ -12,6 +12,7 @@ from antdrive.robots.robot_file import robot_from_text
 from antdrive.runs.campaigns import expand, make_campaign
 from antdrive.worlds import load_task, save_task
 from tools.pages import RUN, TESTED, blocks_of, pages_with_code
+from tools.pictures import SHOWN
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -30,6 +31,7 @@ NOT_RUN = [
     ("docs/how-to/install.md", "they install packages"),
     ("docs/how-to/install.md", "they install packages"),
     ("docs/how-to/robots.md", "they need the repositories of three robots"),
+    ("docs/how-to/tune.md", "it needs Optuna"),
     ("docs/how-to/worlds.md", "they need the network"),
     ("docs/tutorials/first-drive.md", "they set up what the page runs in"),
     ("examples/campaigns/README.md", "they need the worlds of the BARN challenge"),
@@ -163,8 +165,8 @@ def test_the_site_shows_files_names_and_why_a_block_was_not_run(monkeypatch):
     assert "does not run these lines: they need a cluster.\n\n```sh" in shown
 
 
-def test_films_of_the_gallery_have_names_of_their_own():
-    """Examples run at the same time in one folder."""
+def test_pages_of_drives_have_names_of_their_own():
+    """Examples run at the same time in one folder, and pages of pictures lie beside theirs."""
     examples = list((ROOT / "docs" / "gallery").glob("*.py"))
-    films = Counter(film for path in examples for film in re.findall(r'"([\w-]+\.mp4)"', path.read_text()))
-    assert [film for film, count in films.items() if count > 1] == []
+    pages = Counter(page for path in examples for page in re.findall(r'"([\w-]+)\.html"', path.read_text()))
+    assert [page for page, count in (pages + Counter([*SHOWN, "drive"])).items() if count > 1] == []

@@ -2,8 +2,7 @@
 
 from antdrive.sim.log.record import ComponentRecord
 from antdrive.views.export.exporting import export
-from antdrive.views.figures.run_figures import then_and_now
-from antdrive.views.film.comparison_film import compare_film
+from antdrive.views.figures.run_figures import overview
 from antdrive.views.film.video import film, still
 from antdrive.views.pages.campaign_summary import summarise
 from antdrive.views.pages.report import Report, write_report
@@ -42,9 +41,9 @@ def test_invalid_films_figures_exports_and_reports_are_rejected_in_one_line(made
             "a.jpg": lambda: still(drive, out / "a.jpg"),
             "beyond the end": lambda: still(drive, out / "a.png", 99.0),
         },
-        "comparisons": {str(n): lambda n=n: compare_film([drive] * n, out / "c.mp4") for n in (1, 7)},
+        "comparisons": {str(n): lambda n=n: film(dict.fromkeys("abcdefg"[:n], drive), out / "c.mp4") for n in (0, 7)},
         "preludes": {name: lambda n=name, s=settings: preluded(n, s) for name, settings in PLANNERS},
-        "figures": {"a.bmp": lambda: then_and_now(drive, drive, out / "a.bmp")},
+        "figures": {"a.bmp": lambda: overview(drive, out / "a.bmp")},
         "exports": {f"{to} {name}": lambda t=to, n=name: export(log, t, out / n) for to, name in EXPORTS},
         "reports": {
             **{

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import importlib
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -12,6 +13,7 @@ from typing import Any
 
 WIDTH = 24  # characters of a bar in a notebook
 PAUSE = 0.1  # between two updates of a notebook's cell [s]
+_bars: list[Any] = []  # shown on the terminal
 NOTED = 60.0  # between two lines where stderr is no terminal [s]
 
 
@@ -116,10 +118,28 @@ def _on_terminal(label: str) -> Iterator[Callable[..., None]]:
             rows.update(task, note=note, completed=completed, total=total)
 
         before, kernel_cache.on_compile = kernel_cache.on_compile, compiles
+        _bars.append(rows)
         try:
             yield show
         finally:
+            _bars.remove(rows)
             kernel_cache.on_compile = before
+
+
+def hide_bars() -> None:
+    """Erase the bars and end the threads that draw them: neither outlives this process, nor gets into its child."""
+    before = set(threading.enumerate())
+    for rows in _bars:
+        rows.stop()
+    for thread in before if _bars else ():
+        if type(thread).__name__ == "_RefreshThread":  # rich's, which ends soon after `stop`
+            thread.join(1.0)
+
+
+def show_bars() -> None:
+    """Show the bars again that `hide_bars` erased."""
+    for rows in _bars:
+        rows.start()
 
 
 @contextmanager

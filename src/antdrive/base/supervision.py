@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable
 from typing import NoReturn
 
-from antdrive.base import system
+from antdrive.base import progress, system
 
 GRACE = 2.0  # time after the limit for the alarm to end the code [s]
 POLL_INTERVAL = 0.2  # of the parent [s]
@@ -84,6 +84,7 @@ def _fork(report: Callable[[str], NoReturn]) -> None:
     import ctypes  # slow to import, and before the fork
 
     page = mmap.mmap(-1, mmap.PAGESIZE)
+    progress.hide_bars()
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     parent = os.getpid()
@@ -96,6 +97,7 @@ def _fork(report: Callable[[str], NoReturn]) -> None:
     if os.getppid() != parent:
         os._exit(1)
     _page = page
+    progress.show_bars()
 
 
 def _supervise(child: int, page: mmap.mmap, report: Callable[[str], NoReturn]) -> NoReturn:

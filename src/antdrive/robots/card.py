@@ -8,7 +8,7 @@ from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint
 
 WIDTH = 240  # of a drawing [px]
-BODY, BODY_EDGE, WHEEL, HEADING, RULER = "#e8ecf6", "#345cbe", "#39424f", "#ff7a0e", "#5b6576"
+BODY, BODY_EDGE, WHEEL, HEADING, RULER = "#e8ecf6", "#345cbe", "#39424f", "#e06000", "#5b6576"
 MM = 1000.0  # drawing units in a metre; browsers render text badly at a scale of metres
 
 

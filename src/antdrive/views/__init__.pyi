@@ -4,9 +4,9 @@ from .figures.plan_figures import plan_figure as plan_figure
 from .figures.run_figures import certificate_figure as certificate_figure
 from .figures.run_figures import comparison_figure as comparison_figure
 from .figures.run_figures import overview as overview
-from .figures.sight_figure import sight_figure as sight_figure
 from .film.film_options import FilmInfo as FilmInfo
 from .film.video import film as film
 from .film.video import still as still
 from .pages.report import summarise_campaign as summarise_campaign
 from .pages.report import write_report as write_report
+from .viewer.drive_page import write_view as write_view

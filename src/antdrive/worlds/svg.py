@@ -16,7 +16,7 @@ from antdrive.base.types import Bounds, Floats, Pose
 
 LONGER_SIDE = 420  # of a world's drawing [px]
 MAX_DRAWN = 200  # cells along the longer side of a drawn grid; more would slow notebooks down
-OBSTACLE, WALL, START, GOAL, LINE = "#7988a0", "#c4cbd5", "#345cbe", "#008a5c", "#ff7a0e"
+OBSTACLE, WALL, START, GOAL, LINE = "#7988a0", "#c4cbd5", "#345cbe", "#008a5c", "#e06000"
 MOVER = "#a8329e"
 
 

@@ -114,7 +114,7 @@ def test_show_reports_whether_a_robot_can_cross(antdrive, tmp_path):
     assert margins[0] == 0.03 < margins[1]
     assert not json.loads(antdrive("worlds", "show", "no-path", "--json")[1])["passable"]
     assert re.search(
-        "^reason +no path for a disc of 0.21 m .*not even a point", antdrive("worlds", "show", "no-path")[1], re.M
+        "^reason +no path for a disc of 0.21 m .*close off the goal", antdrive("worlds", "show", "no-path")[1], re.M
     )
 
 

@@ -16,7 +16,7 @@ def controller(
     nav2: Annotated[bool, flag("List Nav2's parameters and their counterparts instead.", "--nav2")] = False,
     json: options.Json = False,
 ) -> None:
-    """List the options of pure pursuit, or describe controllers with theirs."""
+    """List the options of pure pursuit, or describe controllers."""
     from antdrive.base.registry import describe, options_card
     from antdrive.robots import list_controllers, load_controller
     from antdrive.robots.control.nav2 import NAV2

@@ -25,7 +25,7 @@ FILES = {
 
 
 def init(folder: Annotated[Path, argument("FOLDER", "Folder for the files; may exist.")] = Path()) -> None:
-    """Write a suite, a robot, a world, a Python test and a GitHub workflow that pass.
+    """Write a suite, robot, world, Python test and CI workflow.
 
     Never overwrites a file.
     """

@@ -24,6 +24,7 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
     """
     from antdrive.base.plane import format_point
     from antdrive.sim.log.margin import budget, has_default
+    from antdrive.sim.log.metrics import measure
     from antdrive.sim.log.rollout import Rollout, log_at
 
     log = Rollout.load(log_at(rollout))
@@ -39,9 +40,11 @@ def margin(rollout: options.Log, json: options.Json = False) -> None:
         for share in spent.contributions
     )
     record, shape = log.record, log.record.shape
+    own = measure(log)["min_clearance_m"]
     others = [name for name, there in (("movers", record.world.movers), ("unseen obstacles", record.unseen)) if there]
     lines = [
-        f"{rollout}: margin {spent.margin:.3f} m, smallest clearance of the robot's {shape} {spent.left:.4f} m at {place}",
+        f"{rollout}: margin {spent.margin:.3f} m, smallest clearance of the robot's {shape} {spent.left:.4f} m at {place}"
+        + ("" if others or shape == "footprint" else f" (of its footprint {own:.4f} m)"),
         *table(("cause", "used at most m", "at", "at the tightest place m"), rows),
         f"largest loss: {spent.largest.cause}"
         if spent.largest.metres

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from antdrive.base.checks import pair
 from antdrive.base.errors import InputError
@@ -15,9 +15,6 @@ from antdrive.cli.listings import Row, world_lines
 from antdrive.cli.options import argument, flag, option
 from antdrive.cli.parse import import_target, numbers, pose
 from antdrive.cli.scenario_options import Ends
-
-if TYPE_CHECKING:
-    pass
 
 MANY = 5000  # cylinders; planning takes seconds beyond this
 
