@@ -43,6 +43,7 @@ from sybil import Document, Example, Region, Sybil
 from antdrive.base import kernel_cache
 
 ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
 #: A command of a block `console` with its output, and one of a block `sh`; lines go on after a backslash.
 COMMAND = re.compile(r"^\$ ((?:.*\\\n)*.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 LINE = re.compile(r"^(\S(?:.*\\\n)*.*)\n", re.MULTILINE)
@@ -55,7 +56,8 @@ TESTED = {
     "examples/bridges/README.md": "tests/examples/test_bridges.py",
     "examples/regression_suite/README.md": "tests/examples/test_regression_suite.py",
 }
-COMPILING = f"antdrive: {kernel_cache.COMPILING}"  # printed only by the first commands of an installation
+#: Lines about kernels, of an installation's first commands, and about progress, on slow machines.
+PASSING = re.compile(rf"antdrive: (?:{re.escape(kernel_cache.COMPILING)}|.*, \d+ (?:s|min|h) left\n)")
 WIDTH = "100"  # terminal width for commands
 #: The project's settings of tests are not those of pages: all of them run, and may warn.
 OPTIONS = ("-p", "tools.pages", "-p", "no:cacheprovider", "-o", "addopts=", "-W", "ignore", "--tb=short", "-q")
@@ -110,7 +112,7 @@ def run_antdrive(words: list[str]) -> tuple[int, str]:
             code = int(ended.code or 0)
         finally:
             sys.argv = before
-    return code, "".join(line for line in out.getvalue().splitlines(keepends=True) if not line.startswith(COMPILING))
+    return code, "".join(line for line in out.getvalue().splitlines(keepends=True) if not PASSING.match(line))
 
 
 def run_words(words: list[str]) -> tuple[int, str]:
@@ -151,6 +153,7 @@ def run_command(command: str) -> tuple[bool, str]:
 def run_block(example: Example) -> str:
     """Run a block. Return what is wrong with it, empty if nothing is."""
     block, output = example.parsed, example.namespace.pop("output", None)
+    example.namespace["page"] = Path(example.path)
     if "not run" in block.marks or "run by" in block.marks:
         return ""
     if "file" in block.marks or "added to" in block.marks:
@@ -217,7 +220,12 @@ def enter(namespace: dict[str, Any]) -> None:
 
 
 def leave(namespace: dict[str, Any]) -> None:
-    """End a page."""
+    """End a page: write the pages of the drives whose pictures it shows, for the site."""
+    page = namespace.get("page", Path())
+    if page.is_relative_to(DOCS):
+        from tools.pictures import write_pages
+
+        write_pages(page.relative_to(DOCS).with_suffix("").as_posix(), DOCS / "_build" / "drives")
     namespace["patch"].undo()
     namespace["folder"].cleanup()
 

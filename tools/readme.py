@@ -6,7 +6,8 @@ from typing import Any
 
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
-PICTURE = re.compile(r"^!\[[^]]*\]\((?!https?:)[^)]*\)\n+(?:\*[^\n]*\*\n+)?", re.MULTILINE)  # with its caption
+#: Pictures, with the head of their table and their caption.
+PICTURE = re.compile(r"^(?:\|.*\|\n\|[-|]+\|\n)?.*!\[[^]]*\]\((?!https?:).*\n+(?:\*[^*]*\*\n+)?", re.MULTILINE)
 LINK = re.compile(r"\[([^]]*)\]\((?!https?:)[^)]*\)")
 
 

@@ -6,8 +6,8 @@ Han's ants choose the next cell by pheromone and by the direction of the goal (H
 an elite search the thesis' map of 14 obstacles, and a robot drives their path.
 """
 
-from antdrive import Scenario, film, plan, run
-from antdrive.views import plan_figure
+from antdrive import Scenario, plan, run
+from antdrive.views import plan_figure, write_view
 
 scenario = Scenario.of(
     "han2007-aco", "aco-han-elite", options={"ants": 100}, seed=4
@@ -34,4 +34,4 @@ print(
     f"{result.metrics['driven_length_m']:.2f} m driven in {result.metrics['duration_s']:.1f} s"
 )
 print(f"certified clearance: at least {result.certificate.bound:.3f} m")
-film(result.rollout, "ants.mp4", camera="top", size=(640, 480), speed=6)
+write_view(result.rollout, "ants.html")

@@ -5,18 +5,18 @@ A collision explained
 The certificate must detect a collision. This cylinder is unknown to planner and controller, so the robot hits it.
 """
 
-from antdrive import Disc, Scenario, film, run
-from antdrive.views import certificate_figure
+from antdrive import Disc, Scenario, run
+from antdrive.views import certificate_figure, write_view
 
 hidden = Disc(3.0, 3.0, 0.2)
 result = run(Scenario.of("empty", "astar", unseen=(hidden,)))
 print(result.outcome.value)
-film(result.rollout, "collision.mp4", size=(640, 480))
+write_view(result.rollout, "gallery-collision.html")
 
 # %%
 # The certificate
 # ---------------
-# Physics reports a contact, and the closed-form distance reaches zero at the same step. The certificate lists both.
+# Physics reports a contact, and the clearance reaches zero at the same step. The certificate lists both.
 
 for line in result.certificate.problems:
     print(line)
@@ -29,4 +29,4 @@ checks = certificate_figure(result.rollout, result.certificate)
 
 passed = run(Scenario.of("empty", "astar", unseen=(hidden,), map="none"))
 print(passed.outcome.value)
-film(passed.rollout, "passed.mp4", camera="top", size=(720, 540), speed=3)
+write_view(passed.rollout, "passed.html")

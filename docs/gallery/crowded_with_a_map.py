@@ -7,8 +7,8 @@ cylinders and leaves a passage for a Jackal. Here the robot has the map.
 """
 
 import numpy as np
-from antdrive import Scenario, film, run
-from antdrive.views import overview
+from antdrive import Scenario, run
+from antdrive.views import overview, write_view
 from antdrive.worlds import barn
 
 world = barn(np.random.default_rng(3), fill=0.27)
@@ -17,7 +17,7 @@ print(result.outcome.value)
 print(
     f"{result.metrics['duration_s']:.1f} s, clearance at least {result.certificate.bound:.3f} m"
 )
-film(result.rollout, "crowded-map.mp4", size=(640, 480), speed=2)
+write_view(result.rollout, "crowded-map.html")
 
 # %%
 # Speed limits

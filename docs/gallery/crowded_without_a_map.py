@@ -8,8 +8,8 @@ its speed to what it can stop within known free ground.
 """
 
 import numpy as np
-from antdrive import Scenario, film, run
-from antdrive.views import sight_figure
+from antdrive import Scenario, run
+from antdrive.views import overview, write_view
 from antdrive.worlds import barn
 
 world = barn(np.random.default_rng(3), fill=0.27)
@@ -21,12 +21,11 @@ print(result.outcome.value)
 print(
     f"{result.metrics['duration_s']:.1f} s, {result.metrics['replans']:.0f} replans"
 )
-film(result.rollout, "crowded-lidar.mp4", camera="top", size=(480, 360), speed=3)
+write_view(result.rollout, "crowded-lidar.html")
 
 # %%
-# Occupancy map and detections
-# ----------------------------
-# Left: the robot's final occupancy map, reconstructed from the scans in its log. Right: the explored area over time, and the
-# first detections of the obstacles with the closest approaches.
+# Route and speed
+# ---------------
+# Each scan that shows an obstacle on the route gives a new route.
 
-seen = sight_figure(result.rollout)
+drive = overview(result.rollout)

@@ -7,8 +7,8 @@ ant skips the mover's cell; after four waits pheromone spreads again, a rule of 
 paper's text: curved walls, and one mover, which steps to a random neighbouring cell every 0.8 s.
 """
 
-from antdrive import Scenario, film, plan, run
-from antdrive.views import overview, plan_figure
+from antdrive import Scenario, plan, run
+from antdrive.views import overview, plan_figure, write_view
 
 scenario = Scenario.of("hasan-1a-moving", "mmas-dstar", seed=0)
 
@@ -31,7 +31,7 @@ print(result.outcome.value)
 print(
     f"{result.metrics['duration_s']:.0f} s, {result.metrics['replans']:.0f} replans"
 )
-film(result.rollout, "spreading.mp4", camera="top", size=(640, 560), speed=6)
+write_view(result.rollout, "spreading.html")
 
 # %%
 # Clearance and speed

@@ -6,17 +6,21 @@ Ibraheem and Ajeil (2016) let later ants of an iteration deposit less pheromone,
 the ant system search a map of 20 × 20 cells with ten obstacles, whose shortest path is as long as the printed one.
 """
 
-from antdrive import Scenario, film, plan, run
-from antdrive.views import plan_figure
-from antdrive.views.figures.paper_figures import history_figure
-from antdrive.views.papers import paper_scenario
+import matplotlib.pyplot as plt
+from antdrive import Scenario, plan, run
+from antdrive.runs.papers.experiments import PAPERS
+from antdrive.views import plan_figure, write_view
+from antdrive.views.papers import experiment_scenario
 
-ageing = paper_scenario("ibraheem2016")
+experiments = {
+    one.name: one for one in PAPERS["ibraheem2016"]() if one.map == "20×20"
+}
+ageing = experiment_scenario(experiments["maco"])
 
 # %%
 # Path length by iteration
 # ------------------------
-# Lines are medians of six seeds, bands their range. See :doc:`the paper's page </papers/ibraheem2016>` for the verdict on each
+# A line a seed. See :doc:`the paper's page </papers/ibraheem2016>` for the verdict on each
 # claim.
 
 runs = {
@@ -25,9 +29,15 @@ runs = {
 }
 for name, found in runs.items():
     print(f"{name:>4}: {', '.join(f'{one.cost:.1f}' for one in found)} m")
-iterations = history_figure(
-    {name: [one.history for one in found] for name, found in runs.items()}
-)
+iterations, axes = plt.subplots()
+for k, (name, found) in enumerate(runs.items()):
+    for seed, one in enumerate(found):
+        label = name if seed == 0 else None
+        axes.step(
+            range(len(one.history)), one.history.best, color=f"C{k}", label=label
+        )
+axes.set(xlabel="iteration", ylabel="best path so far [m]")
+axes.legend()
 
 # %%
 # Final pheromone
@@ -42,4 +52,4 @@ trail = plan_figure(ageing.task, grid, found, ageing.robot)
 
 result = run(ageing)
 print(result.outcome.value)
-film(result.rollout, "ageing.mp4", camera="top", size=(480, 480), speed=5)
+write_view(result.rollout, "ageing.html")

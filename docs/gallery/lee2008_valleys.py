@@ -6,9 +6,8 @@ A potential field attracts the robot to the goal and repels it from obstacles. G
 first local minimum. The ants of Lee, Kim, Choi and Lee (2008) climb a field that rises away from the start.
 """
 
-from antdrive import Scenario, film, plan, run
-from antdrive.views import plan_figure
-from antdrive.views.figures.plan_figures import contours_figure
+from antdrive import Scenario, plan, run
+from antdrive.views import plan_figure, write_view
 
 # %%
 # A local minimum
@@ -24,12 +23,12 @@ valley = plan_figure(descent.task, grid, stuck, descent.robot)
 # Ants escape
 # -----------
 # Ants choose at random by pheromone and field, so some leave the U. The field rises on past the goal, so ants wander there.
-# The contours show their pheromone.
+# Their pheromone covers the map.
 
 colony = Scenario.of("u-trap", "pfaco", options={"ants": 200}, seed=1)
 grid, found = plan(colony)
 print(f"pfaco: {found.cost:.2f} m")
-pheromone = contours_figure(colony.task, grid, found, colony.robot)
+pheromone = plan_figure(colony.task, grid, found, colony.robot)
 
 # %%
 # The drive
@@ -41,4 +40,4 @@ result = run(
 )
 print(f"pfaco with shortcut: {result.plan.cost:.2f} m")
 print(result.outcome.value)
-film(result.rollout, "valley.mp4", camera="top", size=(600, 500), speed=4)
+write_view(result.rollout, "valley.html")

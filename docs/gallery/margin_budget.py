@@ -6,8 +6,9 @@ Planning adds a margin of 6 cm to the robot's radius. The log holds the route, t
 loss of clearance has a cause.
 """
 
-from antdrive import Scenario, film, run
+from antdrive import Scenario, run
 from antdrive.sim.log.margin import CAUSES, budget
+from antdrive.views import write_view
 from matplotlib.figure import Figure
 
 result = run(
@@ -52,6 +53,4 @@ _ = axes.legend(frameon=False)
 
 # sphinx_gallery_thumbnail_number = -1
 
-film(
-    result.rollout, "budget.mp4", camera="follow", size=(480, 360), fps=20, speed=2
-)
+write_view(result.rollout, "budget.html")

@@ -9,8 +9,8 @@ blocked cell next to free ground. One world serves many tasks.
 from dataclasses import replace
 
 import numpy as np
-from antdrive import Scenario, film, run
-from antdrive.views import comparison_figure
+from antdrive import Scenario, run
+from antdrive.views import comparison_figure, write_view
 from antdrive.worlds import CellMap, map_task
 
 # %%
@@ -55,4 +55,4 @@ drives = comparison_figure({name: result.rollout for name, result in runs.items(
 
 # sphinx_gallery_thumbnail_number = -1
 
-film(runs["room, upper right"].rollout, "office.mp4", size=(640, 480), speed=2)
+write_view(runs["room, upper right"].rollout, "office.html")

@@ -6,15 +6,15 @@ Movers follow keyframes, bounce between walls, or wander. The robot is given the
 but not their future motions. Local avoidance runs at 60 Hz, and the robot re-plans when a mover obstructs its route.
 """
 
-from antdrive import Scenario, film, run
-from antdrive.views import overview
+from antdrive import Scenario, run
+from antdrive.views import overview, write_view
 
 result = run(Scenario.of("plaza-moving", "dstar-lite"))
 print(result.outcome.value)
 print(
     f"{result.metrics['replans']:.0f} new routes, avoided movers for {result.metrics['avoiding_s']:.1f} s"
 )
-film(result.rollout, "plaza.mp4", size=(640, 480), speed=2)
+write_view(result.rollout, "gallery-plaza.html")
 
 # %%
 # Clearance and speed over time

@@ -7,7 +7,7 @@ as planned.
 """
 
 from antdrive import Scenario, run
-from antdrive.views import comparison_figure
+from antdrive.views import comparison_figure, write_view
 
 names = ["astar", "tangent", "as", "mmas", "aco-han", "ants"]
 runs = {
@@ -25,3 +25,10 @@ for name, result in runs.items():
 drives = comparison_figure(
     {name: result.rollout for name, result in runs.items() if result.rollout}
 )
+
+# %%
+# Four of them on one clock
+# -------------------------
+
+four = {name: runs[name].rollout for name in ("astar", "tangent", "mmas", "ants")}
+write_view(four, "six-planners.html")

@@ -8,27 +8,30 @@ the paper's. All step back out of dead ends and cut loops short. Parameters are 
 ants, they are those of Lee et al. (2008) or ours.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from antdrive import film, load_planner, plan, run
+from antdrive import load_planner, plan, run
 from antdrive.planners import Query
 from antdrive.runs.papers.experiments import PAPERS
-from antdrive.views.figures.paper_figures import history_figure, maps_figure
-from antdrive.views.papers import paper_scenario
+from antdrive.views import write_view
+from antdrive.views.figures.paper_figures import maps_figure
+from antdrive.views.papers import experiment_scenario
 
-scenario = paper_scenario("suganthi2019")
+experiments = {
+    one.name: one for one in PAPERS["suganthi2019"]() if one.map == "20×20"
+}
+scenario = experiment_scenario(experiments["iaco"])
 grid, _ = plan(scenario)
 query = Query.between(grid, scenario.task)
 
 # %%
 # Path length by iteration
 # ------------------------
-# Lines are medians of five seeds, bands their range.
+# A line a seed.
 
-options = {
-    one.name: one.options for one in PAPERS["suganthi2019"]() if one.map == "20×20"
-}
 planners = {
-    name: load_planner(name, **options[name]) for name in ("iaco", "as", "pfaco")
+    name: load_planner(name, **experiments[name].options)
+    for name in ("iaco", "as", "pfaco")
 }
 plans = {
     name: [one.plan(query, np.random.default_rng(seed)) for seed in range(5)]
@@ -37,9 +40,15 @@ plans = {
 for name, found in plans.items():
     lengths = [one.cost for one in found]
     print(f"{name:>5}: paths of {min(lengths):.1f} to {max(lengths):.1f} m")
-iterations = history_figure(
-    {name: [one.history for one in found] for name, found in plans.items()}
-)
+iterations, axes = plt.subplots()
+for k, (name, found) in enumerate(plans.items()):
+    for seed, one in enumerate(found):
+        label = name if seed == 0 else None
+        axes.step(
+            range(len(one.history)), one.history.best, color=f"C{k}", label=label
+        )
+axes.set(xlabel="iteration", ylabel="best path so far [m]")
+axes.legend()
 
 # %%
 # Paths
@@ -51,19 +60,11 @@ paths = maps_figure(
 )
 
 # %%
-# Search and drive
-# ----------------
-# The first 3 s of the film show the colony's search.
+# The drive
+# ---------
 
 # sphinx_gallery_thumbnail_number = -1
 
 result = run(scenario)
 print(result.outcome.value)
-film(
-    result.rollout,
-    "exploring.mp4",
-    camera="top",
-    size=(480, 480),
-    speed=5,
-    prelude=3.0,
-)
+write_view(result.rollout, "exploring.html")
