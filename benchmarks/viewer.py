@@ -5,7 +5,6 @@
 Without pages it drives among 400 cylinders and 24 movers, across the plaza without a map, and through the office.
 """
 
-import shutil
 import tempfile
 import time
 from pathlib import Path
@@ -21,6 +20,7 @@ from antdrive.views.viewer.drive_page import write_page
 from antdrive.worlds import Cruising, Disc, Task, World
 from benchmarks.markdown import command_line, missing
 from tools.loop import loop
+from tools.site import opened
 
 SMALLEST = ("--seconds 0.2 --only plaza",)
 #: Chromium's note on how it copies pictures where there is no graphics card; no page causes or avoids it.
@@ -82,7 +82,7 @@ def main() -> None:
             page = write_page([LoggedRun.of(Rollout.load(saved))], Path(folder) / f"{k}.html")
             pages[name] = page, f"{log.t[-1]:.1f}", f"{time.perf_counter() - began:.2f}"
         try:
-            browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+            browser = opened(playwright)
         except Error as error:
             missing(str(error))
         print(

@@ -14,7 +14,6 @@ import itertools
 import json
 import os
 import re
-import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
@@ -44,6 +43,7 @@ from antdrive.worlds.generators.generate import generated
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Disc, Task
 from tools.pages import run_page
+from tools.site import SOFTWARE, opened
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PICTURES, DRIVES = DOCS / "pictures", DOCS / "pictures" / "drives.json"
@@ -52,8 +52,6 @@ LOOPS = 2  # times that the first page's film plays
 FIGURES = ("duration_s", "driven_length_m", "min_clearance_m", "tracking_error_max_m")
 FROM_PAPERS = ("hasan-maps.png", "ibraheem2016-history.png", "lee2008-maps.png")
 BY_HAND = ("foxglove.webp",)
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-ARGUMENTS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # of Chromium
 MAPLESS: Mapping[str, Any] = {"robot": "jackal", "map": "none", "localisation": "matching", "noise": 1.0, "seed": 1}
 Logs: TypeAlias = Mapping[str, Rollout]
 
@@ -114,9 +112,8 @@ def screenshot(page: Path, path: Path, size: tuple[int, int], ready: str = "body
     from PIL import Image
     from playwright.sync_api import sync_playwright
 
-    browser_path = next(filter(None, map(shutil.which, BROWSERS)), None)  # else playwright's own
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=browser_path, args=ARGUMENTS)
+        browser = opened(playwright, *SOFTWARE)
         tab = browser.new_page(viewport={"width": size[0], "height": size[1]}, bypass_csp=True)
         tab.goto(page.as_uri())
         tab.wait_for_selector(ready, state="attached")

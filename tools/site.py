@@ -40,6 +40,8 @@ ASKED = {
     "lidar": "explanation/unknown-worlds-sensing",
 }
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+#: Flags of Chromium with which the processor draws the whole page, whatever graphics card there is.
+SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 CHECKED = (("light", WIDE), ("dark", NARROW))
 KEPT = tuple(itertools.product(("light", "dark"), (WIDE, NARROW)))
 
@@ -235,14 +237,18 @@ def missing_browser() -> str:
     except ImportError:
         return "playwright is missing: pip install playwright"
     with sync_playwright() as playwright:
-        found = any(map(shutil.which, BROWSERS)) or Path(playwright.chromium.executable_path).exists()
+        found = browser_path() is not None or Path(playwright.chromium.executable_path).exists()
     return "" if found else "chromium is missing: playwright install chromium, or apt-get install chromium"
 
 
-def opened(playwright: Any) -> Any:
+def browser_path() -> str | None:
+    """Return the Chromium on the path; None if there is none."""
+    return next(filter(None, map(shutil.which, BROWSERS)), None)
+
+
+def opened(playwright: Any, *flags: str) -> Any:
     """Launch the Chromium on the path, or playwright's own."""
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    return playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+    return playwright.chromium.launch(executable_path=browser_path(), args=["--no-sandbox", *flags])
 
 
 def look(site: Path, shots: Path | None, pages: bool = True) -> list[str]:

@@ -116,6 +116,11 @@ PLANNER_STYLES: Mapping[str, tuple[Colour, str]] = MappingProxyType(
 )
 
 
+def field_name(work_unit: str) -> str:
+    """Return what a planner's field is, by the unit of its work."""
+    return "pheromone" if "ant" in work_unit else "planner's field"
+
+
 def shown_field(grid: Grid, field: Floats) -> tuple[Floats, float, float] | None:
     """Return a planner's field (R, C) with nan off free cells, and the values at both ends of its colours; None if constant."""
     values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)

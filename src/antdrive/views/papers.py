@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -15,7 +15,7 @@ from antdrive.runs.papers.experiment import Experiment
 from antdrive.runs.papers.paper_runs import PaperRun
 from antdrive.sim.scenario import Scenario
 from antdrive.views.colours import LabelStyle, label_styles
-from antdrive.views.figures.canvas import endings
+from antdrive.views.figures.canvas import written
 from antdrive.views.figures.paper_figures import ConvergenceCurve, convergence_figure, maps_figure
 from antdrive.worlds.formats.cellmap import CellMap, map_task
 
@@ -37,12 +37,12 @@ def draw_figures(papers: Mapping[str, Measured], folder: Path, suffixes: Sequenc
     drawn = {e.name: e.planner for found in papers.values() for e in [*_convergent(found), *_painted(found)]}
     styles = dict(zip(drawn, label_styles(list(drawn), list(drawn.values())), strict=True))
     files: dict[str, str] = {}
-    for (paper, found), (suffix, end) in itertools.product(papers.items(), endings(suffixes)):
+    for paper, found in papers.items():
         if curves := _curves(found, styles):
-            files[f"{paper} history{end}"] = str(folder / f"{paper}-history{suffix}")
-            convergence_figure(curves, files[f"{paper} history{end}"])
-        files[f"{paper} maps{end}"] = str(folder / f"{paper}-maps{suffix}")
-        maps_figure(_drawn(found), files[f"{paper} maps{end}"], styles=styles)
+            history = partial(convergence_figure, curves)
+            files |= written(f"{paper} history", folder / f"{paper}-history", suffixes, history)
+        maps = partial(maps_figure, _drawn(found), styles=styles)
+        files |= written(f"{paper} maps", folder / f"{paper}-maps", suffixes, maps)
     return files
 
 

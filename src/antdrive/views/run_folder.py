@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -118,22 +119,17 @@ def naming_saved(files: Iterable[str]) -> Iterator[None]:
 
 
 def _write_figures(run: Run, folder: Path, formats: Sequence[str]) -> dict[str, str]:
-    from antdrive.views.figures.run_figures import draw_run
+    from antdrive.views.figures.canvas import written
+    from antdrive.views.figures.plan_figures import plan_figure
+    from antdrive.views.figures.run_figures import certificate_figure, draw_run
 
-    s, files = run.scenario, {"figure": str(folder / "overview.png")}
-    draw_run(run, files["figure"])
-    for suffix in formats:
-        from antdrive.views.figures.plan_figures import plan_figure
-        from antdrive.views.figures.run_figures import certificate_figure
-
-        if suffix != ".png":
-            files[f"figure {suffix[1:]}"] = str(folder / f"overview{suffix}")
-            draw_run(run, files[f"figure {suffix[1:]}"])
-        if run.rollout is not None and run.certificate is not None:
-            files[f"certificate {suffix[1:]}"] = str(folder / f"certificate{suffix}")
-            certificate_figure(run.rollout, run.certificate, files[f"certificate {suffix[1:]}"])
-            files[f"plan {suffix[1:]}"] = str(folder / f"plan{suffix}")
-            plan_figure(s.task, run.grid, run.plan, s.robot, files[f"plan {suffix[1:]}"], mapped=not s.mapless)
+    files = written("figure", folder / "overview", (".png", *formats), partial(draw_run, run))
+    if formats and run.rollout is not None and run.certificate is not None:
+        certificate = partial(certificate_figure, run.rollout, run.certificate)
+        s = run.scenario
+        plan = partial(plan_figure, s.task, run.grid, run.plan, s.robot, mapped=not s.mapless)
+        files |= written("certificate", folder / "certificate", formats, certificate)
+        files |= written("plan", folder / "plan", formats, plan)
     return files
 
 

@@ -3,14 +3,13 @@
 import html
 import json
 import re
-import shutil
 import subprocess
 
 import pytest
 
-BROWSER = next(
-    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
-)
+from tools.site import browser_path
+
+BROWSER = browser_path()
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
 
 

@@ -19,11 +19,12 @@ from antdrive.views.viewer.drive_page import write_page
 from tests.changed_page import changed
 from tests.foreign.test_certificate import here, table
 from tests.made_up_drive import scanned
-from tests.views.pages.browser import BROWSER, needs_browser
+from tests.views.pages.browser import needs_browser
+from tools.site import SOFTWARE
+from tools.site import opened as launched
 
 pytestmark = needs_browser
 __all__ = ["here"]
-SHADER = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 #: The number of different colours at some places of the scene.
 COLOURS = """() => {
   const gl = document.getElementById("scene").getContext("webgl2"), found = new Set(), one = new Uint8Array(4);
@@ -40,7 +41,7 @@ SIZES = {"desk": {"width": 1280, "height": 720}, "phone": {"width": 390, "height
 def chromium():
     api = pytest.importorskip("playwright.sync_api", reason="playwright drives chromium: pip install playwright")
     with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=BROWSER, args=SHADER)
+        browser = launched(playwright, *SOFTWARE)
         yield browser
         browser.close()
 

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -156,12 +157,10 @@ def _views(
             print_error(f"drives.html shows the first {MOST_DRIVES} of {len(logs)} drives; for others: antdrive view")
         files["page"] = str(write_page([LoggedRun.of(logs[name]) for name in shown], folder / "drives.html", shown))
     if formats is not None:
-        from antdrive.views.figures.canvas import endings
+        from antdrive.views.figures.canvas import written
         from antdrive.views.figures.run_figures import comparison_figure
 
-        for suffix, end in endings(dict.fromkeys((".png", *formats))):
-            files[f"figure{end}"] = str(folder / f"comparison{suffix}")
-            comparison_figure(logs, files[f"figure{end}"])
+        files |= written("figure", folder / "comparison", (".png", *formats), partial(comparison_figure, logs))
     if film is not None:
         files["film"] = film_drives(logs, film, **options)["file"]
     return files

@@ -1,5 +1,6 @@
 """`antdrive plan`."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -37,13 +38,13 @@ def plan(
         grid, answer = make_plan(scenario)
     files: dict[str, str] = {}
     if out is not None:
-        from antdrive.views.figures.canvas import endings
+        from antdrive.views.figures.canvas import written
         from antdrive.views.figures.plan_figures import plan_figure
 
         with folder_lock(out):
-            for suffix, end in endings(formats):
-                files[f"plan{end}"] = str(out / f"plan{suffix}")
-                plan_figure(scenario.task, grid, answer, scenario.robot, files[f"plan{end}"])
+            files = written(
+                "plan", out / "plan", formats, partial(plan_figure, scenario.task, grid, answer, scenario.robot)
+            )
     facts = {
         "world": scenario.task.world.name,
         "planner": scenario.planner_name,

@@ -6,7 +6,7 @@ The file's suffix selects PNG, PDF or SVG. Equal data gives equal bytes: files c
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -150,9 +150,13 @@ def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
     return target
 
 
-def endings(suffixes: Iterable[str]) -> list[tuple[str, str]]:
-    """Return pairs of suffix and ending of the figure's key: empty for the first suffix."""
-    return [(suffix, "" if k == 0 else f" {suffix[1:]}") for k, suffix in enumerate(suffixes)]
+def written(kind: str, stem: Path, suffixes: Iterable[str], draw: Callable[[str], object]) -> dict[str, str]:
+    """Draw a figure in each format; return its files by kind, further ones than the first by kind and format."""
+    ends = enumerate(dict.fromkeys(suffixes))
+    files = {f"{kind} {end[1:]}" if k else kind: f"{stem}{end}" for k, end in ends}
+    for file in files.values():
+        draw(file)
+    return files
 
 
 def save_figure(figure: Figure, path: str | Path, *, dpi: float | None = None) -> Path:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from antdrive.views.colours import BAD, MUTED, ROUTE, SHELL, START, hexed
+from antdrive.views.colours import BAD, MUTED, ROUTE, SHELL, START, field_name, hexed
 from antdrive.views.figures.canvas import draw_title, frame_map, legend_above, map_size, sheet
 from antdrive.views.figures.map_chart import draw_coverage, draw_field, draw_legend, draw_map
 from antdrive.views.scene import Scene
@@ -75,8 +75,7 @@ def plan_figure(
     with sheet(path, (wide_all, high + above + (0.4 + LINE * len(below) if below else 0.0)), dpi) as figure:
         areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
         chart = figure.add_subplot(areas[0, 0], label="map")
-        name = "pheromone" if "ant" in plan.work_unit else "planner's field"
-        painted = plan.field is not None and draw_field(figure, chart, grid, plan.field, name)
+        painted = plan.field is not None and draw_field(figure, chart, grid, plan.field, field_name(plan.work_unit))
         draw_map(chart, scene, floor=not painted)
         handles: list[Any] = draw_coverage(chart, covered, high / (shown[3] - shown[1])) if covered else []
         if len(plan.cells):

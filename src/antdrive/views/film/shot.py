@@ -14,7 +14,7 @@ from antdrive.base.types import Floats, Point
 from antdrive.runs.comparing import distinct
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.colours import CONTACT, GOAL, INK, PAPER, START, Colour, label_of, label_styles, mixed
+from antdrive.views.colours import CONTACT, GOAL, INK, PAPER, START, Colour, field_name, label_of, label_styles, mixed
 from antdrive.views.film import overlay
 from antdrive.views.film.camera import Camera, Picture, camera_for
 from antdrive.views.film.compositor import Actor, Compositor, DrivenPath, drawn_height
@@ -45,9 +45,7 @@ class FilmedDrive:
         self.parts = robot_parts(self.robot) if colour is None else robot_parts(self.robot, colour)
         self._ghost = tuple(Part(p.mesh, mixed(p.colour, PAPER, GHOST)) for p in self.parts)
         self.planned = "/".join(dict.fromkeys(f"{log.record.plan.length_m:.1f}" for _, log in same))  # [m]
-        self.route = (
-            f"{polyline_length(self.rollout.route):.1f}" if len(self.rollout.route) > 1 else self.planned
-        )  # [m]
+        self.route = f"{polyline_length(self.rollout.route):.1f}" if len(self.rollout.route) > 1 else self.planned
 
     @functools.cached_property
     def certificate(self) -> str:
@@ -112,7 +110,7 @@ class Shot:
         names, way = rollout.record.limiters, self.playback.limited_lengths()
         limiters = [(self._tints[k], name) for k, name in enumerate(names) if way[k] > SHORT and not several]
         units = " ".join(drive.rollout.record.plan.work_unit for drive in self.drives)
-        field = ("pheromone" if "ant" in units else "planner's field") if planning else ""
+        field = field_name(units) if planning else ""
         entries = overlay.legend_entries(scene, field=field, limiters=limiters, **shows)
         size, said = self.options.size, "" if planning else self.options.note or ""
         count = len(self.drives) if several else 0

@@ -27,7 +27,7 @@ from antdrive.sim.facts import LoggedRun, Run
 from antdrive.sim.log.certificate import at_least
 from antdrive.sim.log.packing import END, LINE, MARK
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.colours import LIMITER_COLOURS, label_styles, shown_field
+from antdrive.views.colours import LIMITER_COLOURS, field_name, label_styles, shown_field
 
 MOST_DRIVES = 4
 MOST_CELLS, LEVELS = 250_000, 50  # of a planner's field
@@ -188,7 +188,7 @@ def field_of(run: Run) -> dict[str, Any]:
     x, y = grid.origin[0] - half, grid.origin[1] - half
     return {
         "field": {
-            "name": "pheromone" if "ant" in plan.work_unit else "planner's field",
+            "name": field_name(plan.work_unit),
             "bounds": [x, y, x + columns * step * grid.cell, y + rows * step * grid.cell],
             "rows": rows,
             "columns": columns,
